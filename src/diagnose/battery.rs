@@ -18,7 +18,7 @@ use super::finding::scene::Scene;
 use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
 use super::noise::scatter::ScatterResult;
-use super::noise::tails::{EXCESS, of_all_views};
+use super::noise::tails::EXCESS;
 use super::noise::texture_finding::TextureFinding;
 use super::options::Ablation;
 use super::search::bias;
@@ -175,7 +175,7 @@ impl Case<'_> {
             excess > 1.0
                 && f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
         };
-        let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS) && of_all_views(t);
+        let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS) && !t.of_some;
         let textures = !scatter.textures.is_empty() || scatter.tails.is_some();
         let textured = scatter.tails.as_ref().is_some_and(far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);

@@ -10,7 +10,7 @@ use crate::diagnose::noise::mixture::Mixture;
 use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
-use crate::diagnose::noise::tails::{EXCESS, of_all_views};
+use crate::diagnose::noise::tails::EXCESS;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::views::field::Field;
@@ -55,7 +55,7 @@ pub fn gained(
     let mut gains = vec![0.0; aside.len()];
     // What has no name is in no model, and what some views have is no mean of all.
     let named = textures.iter().filter(|t| !t.families.is_empty());
-    for texture in named.chain(tails.iter().filter(|t| of_all_views(t))) {
+    for texture in named.chain(tails).filter(|t| !t.of_some) {
         let Some(beyond) = beyond_known(texture, known) else { continue };
         let of = |&v: &usize| {
             let s = &structure[v];

@@ -12,6 +12,7 @@ pub mod outliers;
 pub mod pairs;
 pub mod scatter;
 pub mod skewness;
+pub mod some_views;
 pub mod still;
 pub mod structure;
 pub mod tail_counts;
@@ -30,6 +31,7 @@ use frame_tilts::frame_tilts;
 use frames::unequal;
 use in_time::in_time;
 use pairs::{REACH_PX, window_of};
+use some_views::SomeViews;
 use structure::Structure;
 use texture_finding::{Shared, TextureFinding};
 use view_mean::{ViewMean, nats, variance_px2};
@@ -56,6 +58,49 @@ pub fn texture_findings(
     found.extend(unequal(views, level));
     found
 }
+
+/// Textures that some of the views have, beside those that were `found` of all.
+pub fn textures_of_some(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+    found: &[TextureFinding],
+) -> Vec<TextureFinding> {
+    type OfView = fn(&Structure) -> Option<f64>;
+    type OfAll = fn(&[Structure], &KnownTerms, f64) -> Vec<TextureFinding>;
+    let in_known = |id, name| known.parameter(id, name).unwrap_or(0.0);
+    let in_time_known =
+        in_known("frozen-noise", "fraction") + in_known("temporal-correlation", "rho");
+    let rows_known = in_known(ROW_NOISE, "sigma_px").powi(2);
+    // Of a window no view's correlation is known to lie as far to either side.
+    let windowless = if expected_window(known) > 1.0 { f64::NAN } else { 0.0 };
+    let all: [(&[&str], OfView, f64, OfAll); 3] = [
+        (&[ROW_NOISE], |s| s.row_px2, rows_known, lines),
+        (&["frozen-noise", "temporal-correlation"], |s| s.lagged[0], in_time_known, in_time),
+        (
+            &["spatial-correlation"],
+            |s| s.neighbour_correlation,
+            windowless,
+            |views, known, level| window(views, known, level).into_iter().collect(),
+        ),
+    ];
+    let told = |ids: &[&str]| found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
+    let of = |(ids, of_view, expected, of_all): (&[&str], OfView, f64, OfAll)| {
+        let measured = |s: &Structure| Some((of_view(s).filter(|v| v.is_finite())?, s.pixels));
+        let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
+        let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
+        // The second test of each at this level.
+        let some = SomeViews::above(&values, expected).filter(|some| 2.0 * some.p < level)?;
+        let these: Vec<Structure> = some.which.iter().map(|&v| which[v].clone()).collect();
+        let shown = of_all(&these, known, AMONG_SOME).into_iter();
+        let mut named = shown.filter(|f| f.families.iter().any(|id| ids.contains(id)));
+        Some(named.next()?.of_some(these.len(), views.len(), 2.0 * some.p))
+    };
+    all.into_iter().filter(|test| !told(test.0)).filter_map(of).collect()
+}
+
+/// Which of its names a texture has, where that some views have it is beyond doubt.
+const AMONG_SOME: f64 = 0.05;
 
 /// Windows that differ by less than this factor are the same.
 const SAME_WINDOW: f64 = 1.12;

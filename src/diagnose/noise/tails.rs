@@ -67,9 +67,8 @@ pub fn tails(
     let comparable = !confusers.stepped && !confusers.simulated;
     let of_some = comparable.then(of_some).flatten();
     if let Some(TailedViews { views: some, p }) = of_some.filter(|t| 2.0 * t.p <= level) {
-        let words = format!("in {} of {} views", some.len(), views.len());
-        let found = far_out(&some, parameters, own, 2.0 * p, confusers)?;
-        return Some(TextureFinding { words: Some(words), ..found });
+        let found = far_out(&some, parameters, own, p, confusers)?;
+        return Some(found.of_some(some.len(), views.len(), 2.0 * p));
     }
     let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
     if looked { weak(views, level, parameters) } else { None }
@@ -114,11 +113,6 @@ fn independent_readings(view: &Structure) -> f64 {
     let side = view.window_px.unwrap_or(1.0).max(1.0);
     let repeats = (2.0 * side * side + 1.0) / (3.0 * side);
     view.tails.n / repeats.powi(2)
-}
-
-/// Do all views have these tails? Of some of them the words tell.
-pub fn of_all_views(tails: &TextureFinding) -> bool {
-    tails.words.is_none()
 }
 
 /// The parameter that tells a finding of [`weak`] from one of far errors.

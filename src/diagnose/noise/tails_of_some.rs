@@ -2,12 +2,10 @@
 
 use statrs::distribution::{Binomial, DiscreteCDF, Poisson};
 
+use super::some_views::fewest;
 use super::structure::Structure;
 use super::tail_counts::FEWEST_READINGS;
 
-/// Fewer views than this, and than this share of all, are odd ones.
-const FEWEST: usize = 3;
-const FEWEST_SHARE: f64 = 0.2;
 /// A view has tails where as many are this improbable.
 const CLEAR: f64 = 1e-3;
 
@@ -41,10 +39,6 @@ pub fn tailed_views(
 fn chance(view: &Structure, readings: f64, expected: f64) -> Option<f64> {
     let poisson = Poisson::new(expected * readings).ok()?;
     Some((view.far_places as u64).checked_sub(1).map_or(1.0, |fewer| poisson.sf(fewer)))
-}
-
-fn fewest(views: usize) -> usize {
-    FEWEST.max((FEWEST_SHARE * views as f64).ceil() as usize)
 }
 
 /// Chance that the fewest views that count are all as improbable as the last of them.

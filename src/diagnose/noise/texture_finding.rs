@@ -21,9 +21,17 @@ pub struct TextureFinding {
     /// Roughly, nats a recording.
     pub nats: f64,
     pub words: Option<String>,
+    /// Not all views have it, as the words tell.
+    pub of_some: bool,
 }
 
 impl TextureFinding {
+    /// What these of the views showed when they were taken for all, of so many.
+    pub fn of_some(self, shown: usize, views: usize, p: f64) -> Self {
+        let words = Some(format!("in {shown} of {views} views"));
+        TextureFinding { words, of_some: true, p, ..self }
+    }
+
     /// With these names, and nothing else said yet.
     pub fn named(families: Vec<&'static str>, statistic: Statistic, axis: Axis) -> Self {
         TextureFinding {
@@ -36,6 +44,7 @@ impl TextureFinding {
             p: 1.0,
             nats: 0.0,
             words: None,
+            of_some: false,
         }
     }
 }

@@ -73,20 +73,20 @@ impl ViewMean {
 }
 
 /// What values count by the sizes of what they were measured on.
-struct Weight {
+pub struct Weight {
     sized: bool,
     middle: f64,
 }
 
 impl Weight {
-    fn of(values: &[(f64, f64)]) -> Self {
+    pub fn of(values: &[(f64, f64)]) -> Self {
         let sizes = values.iter().map(|v| v.1).filter(|size| *size > 0.0);
         let middle = mean(sizes);
         Weight { sized: middle.is_some(), middle: middle.unwrap_or(0.0) }
     }
 
     /// A small one says little; views differ for reasons of their own, so that a large one does not say all.
-    fn at(&self, size: f64) -> f64 {
+    pub fn at(&self, size: f64) -> f64 {
         if self.sized { size / (size + ERROR_OVER_OWN * self.middle) } else { 1.0 }
     }
 

@@ -1,0 +1,110 @@
+//! Statistics that some of the views have and the others have not: of those a mean over all tells little.
+
+use statrs::distribution::{
+    Binomial, Chi, Continuous, ContinuousCDF, DiscreteCDF, Normal, StudentsT,
+};
+
+use super::view_mean::Weight;
+
+/// Fewer views than this, and than this share of all, are odd ones.
+const FEWEST: usize = 3;
+const FEWEST_SHARE: f64 = 0.2;
+/// Fewer views below what is expected do not tell how far views scatter.
+const FEWEST_BELOW: usize = 4;
+/// A view is one of those where as far above is this improbable.
+const CLEAR: f64 = 0.01;
+
+/// How many views are more than odd ones.
+pub fn fewest(views: usize) -> usize {
+    FEWEST.max((FEWEST_SHARE * views as f64).ceil() as usize)
+}
+
+/// Views that lie above the others, by their numbers, and the chance that so many lie so far.
+pub struct SomeViews {
+    pub which: Vec<usize>,
+    pub p: f64,
+}
+
+impl SomeViews {
+    /// Of values with the sizes of what they were measured on. Each scatters about `expected` alike to both sides
+    /// where there is nothing, so that those below tell how far.
+    pub fn above(values: &[(f64, f64)], expected: f64) -> Option<Self> {
+        let weight = Weight::of(values);
+        let off: Vec<f64> =
+            values.iter().map(|(x, size)| weight.at(*size).sqrt() * (x - expected)).collect();
+        let below = || off.iter().filter(|t| **t < 0.0);
+        let n = below().count();
+        let scale = (below().map(|t| t * t).sum::<f64>() / n as f64).sqrt();
+        let mut above: Vec<f64> = off.iter().map(|t| t / scale).filter(|t| *t > 0.0).collect();
+        let least = fewest(values.len());
+        if n < FEWEST_BELOW || !(scale > 0.0) || above.len() < least {
+            return None;
+        }
+        above.sort_by(|a, b| b.total_cmp(a));
+        let p = order_statistic(above[least - 1], least, above.len(), n);
+        let student = StudentsT::new(0.0, 1.0, n as f64).ok()?;
+        let clear = |v: &usize| off[*v] > 0.0 && student.sf(off[*v] / scale) < CLEAR;
+        Some(SomeViews { which: (0..off.len()).filter(clear).collect(), p })
+    }
+}
+
+/// Chance that the k-th of `above` half normal values lies this far out, in units of the root mean square of `below`
+/// others: summed over what that may be.
+fn order_statistic(far: f64, k: usize, above: usize, below: usize) -> f64 {
+    const STEPS: usize = 400;
+    let (Ok(chi), Ok(normal)) = (Chi::new(below as u64), Normal::new(0.0, 1.0)) else { return 1.0 };
+    // Nothing is left of the distribution beyond.
+    let end = (below as f64).sqrt() + 6.0;
+    let at = |step: usize| {
+        let chi_value = end * (step as f64 + 0.5) / STEPS as f64;
+        let one = 2.0 * normal.sf(far * chi_value / (below as f64).sqrt());
+        let all = Binomial::new(one.clamp(0.0, 1.0), above as u64);
+        all.map_or(1.0, |all| all.sf(k as u64 - 1)) * chi.pdf(chi_value)
+    };
+    ((0..STEPS).map(at).sum::<f64>() * end / STEPS as f64).clamp(1e-300, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::rng::{Seed, Stream};
+
+    fn values(n: usize, tall: usize, by: f64, rng: &mut Stream) -> Vec<(f64, f64)> {
+        let view = |v| {
+            let x: f64 = StandardNormal.sample(rng);
+            let size: f64 = rng.random_range(0.9e4..1.1e4);
+            (0.3 + 0.01 * (x + if v < tall { by } else { 0.0 }), size)
+        };
+        (0..n).map(view).collect()
+    }
+
+    /// Of sessions without anything one in a hundred is found at that level.
+    #[test]
+    fn clean_views_are_found_as_often_as_the_level_says() {
+        let mut rng = Seed(3).stream("some-views/null");
+        for n in [10, 16, 30] {
+            let chance =
+                |_| SomeViews::above(&values(n, 0, 0.0, &mut rng), 0.3).map_or(1.0, |s| s.p);
+            let seen = (0..4000).map(chance).filter(|p| *p < 0.01).count();
+            // Binomial: 40, give or take 6.3; sizes that differ and too few to one side make it fewer.
+            assert!((8..60).contains(&seen), "{seen} of 4000 with {n}");
+        }
+    }
+
+    #[test]
+    fn a_quarter_of_the_views_is_told_and_one_is_odd() {
+        let mut rng = Seed(4).stream("some-views/quarter");
+        for _ in 0..50 {
+            let found = SomeViews::above(&values(20, 5, 12.0, &mut rng), 0.3).expect("views");
+            assert!(found.p < 1e-3 && found.which[..5] == [0, 1, 2, 3, 4], "{:?}", found.which);
+        }
+        let odd = values(20, 1, 100.0, &mut rng);
+        assert!(SomeViews::above(&odd, 0.3).is_none_or(|s| s.p > 1e-3));
+        // As many to the other side are no effect.
+        let low = values(20, 5, -12.0, &mut rng);
+        assert!(SomeViews::above(&low, 0.3).is_none_or(|s| s.p > 1e-3));
+    }
+}
