@@ -31,7 +31,7 @@ use frame_tilts::frame_tilts;
 use frames::unequal;
 use in_time::in_time;
 use pairs::{REACH_PX, window_of};
-use some_views::SomeViews;
+use some_views::some_views;
 use structure::Structure;
 use texture_finding::{Shared, TextureFinding};
 use view_mean::{ViewMean, nats, variance_px2};
@@ -86,15 +86,12 @@ pub fn textures_of_some(
     ];
     let told = |ids: &[&str]| found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
     let of = |(ids, of_view, expected, of_all): (&[&str], OfView, f64, OfAll)| {
-        let measured = |s: &Structure| Some((of_view(s).filter(|v| v.is_finite())?, s.pixels));
-        let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
-        let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
         // The second test of each at this level.
-        let some = SomeViews::above(&values, expected).filter(|some| 2.0 * some.p < level)?;
-        let these: Vec<Structure> = some.which.iter().map(|&v| which[v].clone()).collect();
+        let (these, p) =
+            some_views(views, of_view, expected).filter(|some| 2.0 * some.1 < level)?;
         let shown = of_all(&these, known, AMONG_SOME).into_iter();
         let mut named = shown.filter(|f| f.families.iter().any(|id| ids.contains(id)));
-        Some(named.next()?.of_some(these.len(), views.len(), 2.0 * some.p))
+        Some(named.next()?.of_some(these.len(), views.len(), 2.0 * p))
     };
     all.into_iter().filter(|test| !told(test.0)).filter_map(of).collect()
 }

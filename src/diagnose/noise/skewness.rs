@@ -1,5 +1,6 @@
 //! Errors that reach farther to one side than to the other.
 
+use super::some_views::some_views;
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats};
@@ -10,33 +11,38 @@ use crate::terms::{Axis, Statistic};
 /// (docs/physics.md, 48); so little is no news.
 const LEAST: f64 = 0.05;
 
-/// Of all views, in the disparity and in the depth alike: noise that is symmetric in one of them is skewed in the
-/// other.
+/// Of all views or of some, in the disparity and in the depth alike: noise that is symmetric in one of them is skewed
+/// in the other.
 pub fn skewness(views: &[Structure], level: f64) -> Option<TextureFinding> {
-    let of = |k: usize| ViewMean::of(views, |s| Some(s.skewness()?[k]));
-    let both = [of(0)?, of(1)?];
-    let by_size = |a: &&ViewMean, b: &&ViewMean| a.value.abs().total_cmp(&b.value.abs());
-    let m = both.iter().min_by(by_size)?;
-    let one_sided = both.iter().all(|b| b.value * m.value > 0.0);
-    // Either way.
-    let p = 2.0 * both.iter().map(|b| b.p_above(0.0).min(b.p_below(0.0))).fold(0.0, f64::max);
-    if !one_sided || m.value.abs() < LEAST || p > level {
-        return None;
+    [1.0, -1.0].into_iter().find_map(|sign| to_side(views, sign, level))
+}
+
+/// To large disparities, or to small ones.
+fn to_side(views: &[Structure], sign: f64, level: f64) -> Option<TextureFinding> {
+    let of =
+        |s: &Structure| s.skewness()?.map(|skew| sign * skew).into_iter().min_by(f64::total_cmp);
+    let m = ViewMean::of(views, of)?;
+    // Either side has half of the level, and either test.
+    let p = 2.0 * m.p_above(0.0);
+    if m.value >= LEAST && p <= level {
+        return Some(found(&m, sign, p));
     }
-    let side = if m.value > 0.0 {
-        "large disparities than to small"
-    } else {
-        "small disparities than to large"
-    };
-    Some(TextureFinding {
-        parameters: one("skewness", m.value, m.std_error),
-        // What a Gaussian of the same variance would be off by, to first order of its series in Hermite polynomials.
-        size_sigma: m.value.abs() / 6f64.sqrt(),
+    let (these, p) = some_views(views, of, 0.0)?;
+    let m = ViewMean::of(&these, of).filter(|m| m.value >= LEAST && 4.0 * p <= level)?;
+    Some(found(&m, sign, p).of_some(these.len(), views.len(), 4.0 * p))
+}
+
+fn found(m: &ViewMean, sign: f64, p: f64) -> TextureFinding {
+    let side = if sign > 0.0 { "large disparities" } else { "small disparities" };
+    TextureFinding {
+        parameters: one("skewness", sign * m.value, m.std_error),
+        // What a Gaussian of the same variance is off by, to first order of its series in Hermite polynomials.
+        size_sigma: m.value / 6f64.sqrt(),
         p,
         nats: nats(m, 0.0),
-        words: Some(format!("they reach farther to {side} ones")),
+        words: Some(format!("they reach farther to {side} than to the other side")),
         ..TextureFinding::named(vec![], Statistic::Distribution, Axis::Residual)
-    })
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use statrs::distribution::{
     Binomial, Chi, Continuous, ContinuousCDF, DiscreteCDF, Normal, StudentsT,
 };
 
+use super::structure::Structure;
 use super::view_mean::Weight;
 
 /// Fewer views than this, and than this share of all, are odd ones.
@@ -20,15 +21,15 @@ pub fn fewest(views: usize) -> usize {
 }
 
 /// Views that lie above the others, by their numbers, and the chance that so many lie so far.
-pub struct SomeViews {
-    pub which: Vec<usize>,
-    pub p: f64,
+struct SomeViews {
+    which: Vec<usize>,
+    p: f64,
 }
 
 impl SomeViews {
     /// Of values with the sizes of what they were measured on. Each scatters about `expected` alike to both sides
     /// where there is nothing, so that those below tell how far.
-    pub fn above(values: &[(f64, f64)], expected: f64) -> Option<Self> {
+    fn above(values: &[(f64, f64)], expected: f64) -> Option<Self> {
         let weight = Weight::of(values);
         let off: Vec<f64> =
             values.iter().map(|(x, size)| weight.at(*size).sqrt() * (x - expected)).collect();
@@ -46,6 +47,19 @@ impl SomeViews {
         let clear = |v: &usize| off[*v] > 0.0 && student.sf(off[*v] / scale) < CLEAR;
         Some(SomeViews { which: (0..off.len()).filter(clear).collect(), p })
     }
+}
+
+/// Those of the views whose `value` lies above the others', and the chance of it.
+pub fn some_views(
+    views: &[Structure],
+    value: impl Fn(&Structure) -> Option<f64>,
+    expected: f64,
+) -> Option<(Vec<Structure>, f64)> {
+    let measured = |s: &Structure| Some((value(s).filter(|v| v.is_finite())?, s.pixels));
+    let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
+    let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
+    let some = SomeViews::above(&values, expected)?;
+    Some((some.which.iter().map(|&v| which[v].clone()).collect(), some.p))
 }
 
 /// Chance that the k-th of `above` half normal values lies this far out, in units of the root mean square of `below`

@@ -28,7 +28,8 @@ pub struct TextureFinding {
 impl TextureFinding {
     /// What these of the views showed when they were taken for all, of so many.
     pub fn of_some(self, shown: usize, views: usize, p: f64) -> Self {
-        let words = Some(format!("in {shown} of {views} views"));
+        let which = format!("in {shown} of {views} views");
+        let words = Some(self.words.map_or(which.clone(), |words| format!("{words}, {which}")));
         TextureFinding { words, of_some: true, p, ..self }
     }
 
