@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Edges, INSIDE_PX};
 use crate::diagnose::finding::parameters::one;
+use crate::diagnose::noise::some_views::SomeViews;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::{ViewMean, nats};
 use crate::diagnose::views::field::Field;
@@ -105,20 +106,45 @@ fn combined(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
     (n > 1.0 && sure > 0.0).then_some((ViewMean { value, std_error, views: n }, explained))
 }
 
-/// Depth mixed at the edge, where the views agree on it at this level.
+/// A footprint's width, the views' mean share of it and how well it explains them.
+type Footprint = (f64, (ViewMean, f64));
+
+/// The width that explains the views best.
+fn best(edges: &[&Edges], twins: Option<&[&Edges]>, widths: &[f64]) -> Option<Footprint> {
+    let at = |w: &f64| Some((*w, mean_share(edges, twins, *w)?));
+    let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > TOO_FEW_VIEWS);
+    seen.max_by(|a, b| a.1.1.total_cmp(&b.1.1))
+}
+
+/// Views whose edges mix while the others' do not, and the chance of it.
+fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, f64)> {
+    let at = |width: &f64| {
+        let sure = |e: &&'a Edges| share(e, *width).map(|(value, sure)| (*e, value * sure.sqrt()));
+        let (seen, off): (Vec<&Edges>, Vec<f64>) = edges.iter().filter_map(sure).unzip();
+        let some = SomeViews::above(&off)?;
+        Some((some.which.iter().map(|&v| seen[v]).collect::<Vec<_>>(), some.p))
+    };
+    TRIED_PX.iter().filter_map(at).min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Depth mixed at the edge, where the views, or some of them, agree on it at this level.
 pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<TextureFinding> {
     let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
-    let at = |w: &f64| Some((*w, mean_share(&edges, twins.as_deref(), *w)?));
-    let best = |widths: &[f64]| {
-        let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > TOO_FEW_VIEWS);
-        seen.max_by(|a, b| a.1.1.total_cmp(&b.1.1))
-    };
-    let p = (TRIED_PX.len() as f64 * best(&TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
-    if p > level {
-        return None;
+    let twins = twins.as_deref();
+    let tried = TRIED_PX.len() as f64;
+    let p = (tried * best(&edges, twins, &TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
+    if p <= level {
+        return found(&edges, best(&edges, twins, &WIDTHS_PX)?, p);
     }
-    let (width, (share, _)) = best(&WIDTHS_PX)?;
+    // The second test at this level.
+    let (some, p) = twins.is_none().then(|| mixing_views(&edges)).flatten()?;
+    let p = 2.0 * tried * p;
+    let footprint = (p <= level).then(|| best(&some, None, &WIDTHS_PX)).flatten()?;
+    Some(found(&some, footprint, p)?.of_some(some.len(), edges.len(), p))
+}
+
+fn found(edges: &[&Edges], (width, (share, _)): Footprint, p: f64) -> Option<TextureFinding> {
     let full = mixed_px(width);
     let [mixed, error] = [full * share.value, full * share.std_error];
     let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
@@ -126,10 +152,10 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<T
     let whole = width_px(mixed);
     let std_error = slope.hypot(width - whole);
     let edge = share.value * footprint(0, width);
-    Some(TextureFinding {
+    (share.value > 0.0).then(|| TextureFinding {
         interval: [0.0, width],
         parameters: one("width_px", whole, std_error),
-        size_sigma: edge * step_sigmas(&edges),
+        size_sigma: edge * step_sigmas(edges),
         p,
         nats: nats(&share, 0.0),
         words: Some(format!(

@@ -8,6 +8,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::{EdgeLoss, Edges};
 use crate::diagnose::checks::replication::agree;
 use crate::diagnose::diagnosis::Curve;
+use crate::diagnose::noise::some_views::SomeViews;
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::null::student;
 
@@ -24,6 +25,8 @@ pub struct Band {
     pub gain: [f64; 2],
     pub p: f64,
     pub curve: Curve,
+    /// So many of so many views have it, where not all do.
+    pub of_some: Option<[usize; 2]>,
 }
 
 const FEWEST_VIEWS: usize = 3;
@@ -88,8 +91,34 @@ fn nats(share: &ViewMean, views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> 
         + 0.5 * views.iter().map(explained).sum::<f64>()
 }
 
-/// The band that the views agree on, if there is one at this level.
+/// The band that the views agree on, or some of them, if there is one at this level.
 pub fn band(views: &[Sides], level: f64) -> Option<Band> {
+    let all = band_of(views)?;
+    if all.p <= level {
+        return Some(all);
+    }
+    let (some, p) = [0, 1]
+        .iter()
+        .filter_map(|side| shaded_views(views, *side))
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    // Two sides, and the second test at this level.
+    let p = 4.0 * p;
+    let of_some = Some([some.len(), views.len()]);
+    (p <= level).then(|| Some(Band { p, of_some, ..band_of(&some)? }))?
+}
+
+/// Views that lose more on this side than a border errs by, and the chance of it.
+fn shaded_views(views: &[Sides], side: usize) -> Option<(Vec<Sides>, f64)> {
+    let seen: Vec<(Sides, EdgeLoss)> =
+        views.iter().filter_map(|s| Some((*s, s.0[side]?))).collect();
+    let widths: Vec<f64> = seen.iter().map(|(_, v)| v.lost / v.rows).collect();
+    // As sure as a constant of a measurement is.
+    let some = SomeViews::beyond(&widths, BORDER_PX, 30)?;
+    Some((some.which.iter().map(|&v| seen[v].0).collect(), some.p))
+}
+
+/// What the views agree on, whatever the chance of it.
+fn band_of(views: &[Sides]) -> Option<Band> {
     let sides = by_side(views);
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
     let side = usize::from(share(1) > share(0));
@@ -98,9 +127,6 @@ pub fn band(views: &[Sides], level: f64) -> Option<Band> {
     let student = StudentsT::new(0.0, 1.0, lawful.views - 1.0).ok()?;
     // Two sides were looked at.
     let p = (2.0 * student.sf(t(&lawful))).min(1.0);
-    if p > level {
-        return None;
-    }
     let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
     let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
     Some(Band {
@@ -110,6 +136,7 @@ pub fn band(views: &[Sides], level: f64) -> Option<Band> {
         gain,
         p,
         curve: curve(views, lawful.value),
+        of_some: None,
     })
 }
 
@@ -135,7 +162,7 @@ pub fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
     let half = |which: bool| {
         let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
         let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
-        let Band { side, share: [value, std_error], .. } = band(&mine, 1.0)?;
+        let Band { side, share: [value, std_error], .. } = band_of(&mine)?;
         Some((side, ViewMean { value, std_error, views: mine.len() as f64 }))
     };
     let (first, second) = (half(false)?, half(true)?);

@@ -249,7 +249,11 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
         ..named(family.unwrap_or_default(), Statistic::Dropout, Axis::EdgeDistance)
     };
     let rivals = [("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])];
-    described(finding, family, &rivals, None)
+    let mut finding = described(finding, family, &rivals, None);
+    if let Some([some, all]) = band.of_some {
+        finding.physics += &format!(" Measured here: in {some} of {all} views.");
+    }
+    finding
 }
 
 /// With its name, if it has one, its rivals, and what is said of both.

@@ -26,6 +26,7 @@ pub struct TiltScatter {
 
 impl TiltScatter {
     /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three.
+    /// Where the noise is larger far from the middle, as on a tilted target, slopes err by more.
     pub fn of(field: &Field, mean_px2: f64) -> Option<Self> {
         let times: Vec<f64> = field.frames.iter().map(|f| f.0).collect();
         let axes = axes(field)?;
@@ -37,7 +38,11 @@ impl TiltScatter {
         };
         let sum_px2 = of_axis(0)? + of_axis(1)?;
         let freedom = 2.0 * (n as f64 - 2.0);
-        Some(TiltScatter { sum_px2, freedom, expected_px2: mean_px2 })
+        let noise = || field.sigma.iter().map(|s| f64::from(*s).powi(2));
+        let apart = axes.iter().zip(noise()).map(|([u, v], px2)| 0.5 * (u * u + v * v) * px2);
+        let lever = apart.sum::<f64>() / noise().sum::<f64>();
+        let expected_px2 = lever * mean_px2;
+        (expected_px2 > 0.0).then_some(TiltScatter { sum_px2, freedom, expected_px2 })
     }
 
     /// Per degree of freedom, beyond what is expected, px^2.
@@ -90,14 +95,14 @@ fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> [f64; 2] {
 pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<TextureFinding> {
     let all: Vec<TiltScatter> = views.iter().filter_map(|s| s.tilts).collect();
     let freedom: f64 = all.iter().map(|t| t.freedom).sum();
-    let expected = |t: &TiltScatter| (t.expected_px2 + jitter_px2).max(1e-300);
+    let expected = |t: &TiltScatter| t.expected_px2 + jitter_px2;
     let ratio: f64 = all.iter().map(|t| t.sum_px2 / expected(t)).sum();
     let p = ChiSquared::new(freedom).ok()?.sf(ratio / MUCH);
-    if p >= level {
+    let beyond_px2 = all.iter().map(|t| t.freedom * t.beyond_px2()).sum::<f64>() / freedom;
+    if !(p < level && beyond_px2 > 0.0) {
         return None;
     }
-    let beyond: f64 = all.iter().map(|t| t.freedom * t.beyond_px2()).sum();
-    let sigma = (beyond / freedom).max(0.0).sqrt();
+    let sigma = beyond_px2.sqrt();
     let larger = ratio / freedom;
     Some(TextureFinding {
         parameters: one("sigma_px", sigma, sigma / (2.0 * freedom).sqrt()),

@@ -21,29 +21,31 @@ pub fn fewest(views: usize) -> usize {
 }
 
 /// Views that lie above the others, by their numbers, and the chance that so many lie so far.
-struct SomeViews {
-    which: Vec<usize>,
-    p: f64,
+pub struct SomeViews {
+    pub which: Vec<usize>,
+    pub p: f64,
 }
 
 impl SomeViews {
-    /// Of values with the sizes of what they were measured on. Each scatters about `expected` alike to both sides
-    /// where there is nothing, so that those below tell how far.
-    fn above(values: &[(f64, f64)], expected: f64) -> Option<Self> {
-        let weight = Weight::of(values);
-        let off: Vec<f64> =
-            values.iter().map(|(x, size)| weight.at(*size).sqrt() * (x - expected)).collect();
+    /// Of what each view is off by, in one unit. Where there is nothing, they scatter alike to both sides, so that
+    /// those below tell how far.
+    pub fn above(off: &[f64]) -> Option<Self> {
         let below = || off.iter().filter(|t| **t < 0.0);
         let n = below().count();
         let scale = (below().map(|t| t * t).sum::<f64>() / n as f64).sqrt();
+        (n >= FEWEST_BELOW && scale > 0.0).then(|| SomeViews::beyond(off, scale, n))?
+    }
+
+    /// Of what each view is off by, which is known to err by `scale`, as `freedom` values tell.
+    pub fn beyond(off: &[f64], scale: f64, freedom: usize) -> Option<Self> {
         let mut above: Vec<f64> = off.iter().map(|t| t / scale).filter(|t| *t > 0.0).collect();
-        let least = fewest(values.len());
-        if n < FEWEST_BELOW || !(scale > 0.0) || above.len() < least {
+        let least = fewest(off.len());
+        if above.len() < least {
             return None;
         }
         above.sort_by(|a, b| b.total_cmp(a));
-        let p = order_statistic(above[least - 1], least, above.len(), n);
-        let student = StudentsT::new(0.0, 1.0, n as f64).ok()?;
+        let p = order_statistic(above[least - 1], least, above.len(), freedom);
+        let student = StudentsT::new(0.0, 1.0, freedom as f64).ok()?;
         let clear = |v: &usize| off[*v] > 0.0 && student.sf(off[*v] / scale) < CLEAR;
         Some(SomeViews { which: (0..off.len()).filter(clear).collect(), p })
     }
@@ -58,7 +60,9 @@ pub fn some_views(
     let measured = |s: &Structure| Some((value(s).filter(|v| v.is_finite())?, s.pixels));
     let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
     let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
-    let some = SomeViews::above(&values, expected)?;
+    let weight = Weight::of(&values);
+    let off = values.iter().map(|(x, size)| weight.at(*size).sqrt() * (x - expected));
+    let some = SomeViews::above(&off.collect::<Vec<_>>())?;
     Some((some.which.iter().map(|&v| which[v].clone()).collect(), some.p))
 }
 
@@ -80,19 +84,14 @@ fn order_statistic(far: f64, k: usize, above: usize, below: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use rand::Rng;
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
     use crate::rng::{Seed, Stream};
 
-    fn values(n: usize, tall: usize, by: f64, rng: &mut Stream) -> Vec<(f64, f64)> {
-        let view = |v| {
-            let x: f64 = StandardNormal.sample(rng);
-            let size: f64 = rng.random_range(0.9e4..1.1e4);
-            (0.3 + 0.01 * (x + if v < tall { by } else { 0.0 }), size)
-        };
-        (0..n).map(view).collect()
+    fn views(n: usize, tall: usize, by: f64, rng: &mut Stream) -> Vec<f64> {
+        let mut normal = || -> f64 { StandardNormal.sample(rng) };
+        (0..n).map(|v| 0.01 * (normal() + if v < tall { by } else { 0.0 })).collect()
     }
 
     /// Of sessions without anything one in a hundred is found at that level.
@@ -100,10 +99,9 @@ mod tests {
     fn clean_views_are_found_as_often_as_the_level_says() {
         let mut rng = Seed(3).stream("some-views/null");
         for n in [10, 16, 30] {
-            let chance =
-                |_| SomeViews::above(&values(n, 0, 0.0, &mut rng), 0.3).map_or(1.0, |s| s.p);
+            let chance = |_| SomeViews::above(&views(n, 0, 0.0, &mut rng)).map_or(1.0, |s| s.p);
             let seen = (0..4000).map(chance).filter(|p| *p < 0.01).count();
-            // Binomial: 40, give or take 6.3; sizes that differ and too few to one side make it fewer.
+            // Binomial: 40, give or take 6.3; too few to one side make it fewer.
             assert!((8..60).contains(&seen), "{seen} of 4000 with {n}");
         }
     }
@@ -112,13 +110,13 @@ mod tests {
     fn a_quarter_of_the_views_is_told_and_one_is_odd() {
         let mut rng = Seed(4).stream("some-views/quarter");
         for _ in 0..50 {
-            let found = SomeViews::above(&values(20, 5, 12.0, &mut rng), 0.3).expect("views");
+            let found = SomeViews::above(&views(20, 5, 12.0, &mut rng)).expect("views");
             assert!(found.p < 1e-3 && found.which[..5] == [0, 1, 2, 3, 4], "{:?}", found.which);
         }
-        let odd = values(20, 1, 100.0, &mut rng);
-        assert!(SomeViews::above(&odd, 0.3).is_none_or(|s| s.p > 1e-3));
+        let odd = views(20, 1, 100.0, &mut rng);
+        assert!(SomeViews::above(&odd).is_none_or(|s| s.p > 1e-3));
         // As many to the other side are no effect.
-        let low = values(20, 5, -12.0, &mut rng);
-        assert!(SomeViews::above(&low, 0.3).is_none_or(|s| s.p > 1e-3));
+        let low = views(20, 5, -12.0, &mut rng);
+        assert!(SomeViews::above(&low).is_none_or(|s| s.p > 1e-3));
     }
 }
