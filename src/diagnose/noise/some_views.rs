@@ -109,10 +109,13 @@ mod tests {
     #[test]
     fn a_quarter_of_the_views_is_told_and_one_is_odd() {
         let mut rng = Seed(4).stream("some-views/quarter");
+        let mut clear = 0;
         for _ in 0..50 {
-            let found = SomeViews::above(&views(20, 5, 12.0, &mut rng)).expect("views");
-            assert!(found.p < 1e-3 && found.which[..5] == [0, 1, 2, 3, 4], "{:?}", found.which);
+            let Some(found) = SomeViews::above(&views(20, 5, 12.0, &mut rng)) else { continue };
+            clear += usize::from(found.p < 1e-4 && found.which[..5] == [0, 1, 2, 3, 4]);
         }
+        // The rest has so few views below that they tell little of how far views scatter.
+        assert!(clear >= 45, "{clear} of 50");
         let odd = views(20, 1, 100.0, &mut rng);
         assert!(SomeViews::above(&odd).is_none_or(|s| s.p > 1e-3));
         // As many to the other side are no effect.

@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use crate::diagnose::options::FRAMES_KEPT;
-use crate::diagnose::views::box_sums::high_pass;
+use crate::diagnose::views::box_sums::{gross_limit, high_pass};
 use crate::diagnose::views::field::Field;
-use crate::stats::{MAD_TO_SIGMA, measure_correlation, median_in_place};
+use crate::stats::measure_correlation;
 
 /// Frames that resemble one another more than this have little noise of their own.
 const STILL: f64 = 0.6;
@@ -71,9 +71,8 @@ pub fn at_two_scales(field: &Field, residuals: &[f32], bias: &[f32]) -> [Vec<f32
 
 /// Without gross errors.
 pub fn without_outliers(image: &[f32]) -> Vec<f32> {
-    let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
-    let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
-    let kept = |r: &f32| if limit > 0.0 && r.abs() > limit { f32::NAN } else { *r };
+    let limit = gross_limit(image);
+    let kept = |r: &f32| if r.abs() > limit { f32::NAN } else { *r };
     image.iter().map(kept).collect()
 }
 

@@ -1,14 +1,22 @@
 //! Sums over boxes of an image, and what is left of it without their mean.
 
+use crate::stats::{MAD_TO_SIGMA, median_in_place};
+
 /// Side of the box whose mean is taken out, px: several windows, and less than a lens's bowl.
 pub const SMOOTH_PX: usize = 49;
 
 /// Tells of every finite pixel the sum and the number of the finite pixels no farther than `reach` from it
 /// along either axis: running sums down the columns, and of these along the row.
-pub fn over_boxes(
+pub fn over_boxes(image: &[f32], width: usize, reach: usize, tell: impl FnMut(usize, f64, f64)) {
+    over_boxes_within(image, width, reach, f32::MAX, tell);
+}
+
+/// The same, where what is larger than `limit` is in no sum.
+fn over_boxes_within(
     image: &[f32],
     width: usize,
     reach: usize,
+    limit: f32,
     mut tell: impl FnMut(usize, f64, f64),
 ) {
     let add = |to: &mut [f64; 2], [sum, n]: [f64; 2], sign: f64| {
@@ -17,7 +25,7 @@ pub fn over_boxes(
     };
     let change = |columns: &mut [[f64; 2]], row: &[f32], sign: f64| {
         for (column, r) in columns.iter_mut().zip(row) {
-            let pixel = if r.is_finite() { [f64::from(*r), 1.0] } else { [0.0; 2] };
+            let pixel = if r.abs() <= limit { [f64::from(*r), 1.0] } else { [0.0; 2] };
             add(column, pixel, sign);
         }
     };
@@ -48,10 +56,12 @@ pub fn over_boxes(
     }
 }
 
-/// Minus its mean over a box of `side` px, where at least a quarter of the box is there; NaN elsewhere.
+/// Minus its mean over a box of `side` px, where at least a quarter of the box is there; NaN elsewhere. Gross errors
+/// are in no mean: a few at a target's rim would lift all of their neighbours.
 pub fn high_pass(image: &[f32], width: usize, side: usize) -> Vec<f32> {
     let mut left = vec![f32::NAN; image.len()];
-    over_boxes(image, width, side / 2, |i, sum, n| {
+    let limit = gross_limit(image);
+    over_boxes_within(image, width, side / 2, limit, |i, sum, n| {
         if 4.0 * n >= (side * side) as f64 {
             left[i] = image[i] - (sum / n) as f32;
         }
@@ -59,10 +69,32 @@ pub fn high_pass(image: &[f32], width: usize, side: usize) -> Vec<f32> {
     left
 }
 
+/// Beyond this an error is gross: six robust standard deviations of what is there about nothing. None is where most
+/// errors are nothing.
+pub fn gross_limit(image: &[f32]) -> f32 {
+    let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
+    let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
+    if limit > 0.0 { limit } else { f32::MAX }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::stats::SummedArea;
+
+    /// A block that sees something else stays what it is, and its neighbours too.
+    #[test]
+    fn gross_errors_lift_no_neighbours() {
+        const SIDE: usize = 60;
+        let block = |i: usize| (20..28).contains(&(i % SIDE)) && (20..28).contains(&(i / SIDE));
+        let image: Vec<f32> = (0..SIDE * SIDE)
+            .map(|i| if block(i) { 50.0 } else { (1.7 * i as f32).sin() })
+            .collect();
+        let left = high_pass(&image, SIDE, 21);
+        for (i, (left, r)) in left.iter().zip(&image).enumerate() {
+            assert!((left - r).abs() < 0.2, "{i}: {left} of {r}");
+        }
+    }
 
     /// Against a summed-area table, on an image with holes, empty rows and a wide empty rim.
     #[test]
