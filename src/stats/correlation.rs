@@ -35,7 +35,6 @@ const CUT: f64 = 3.5;
 /// Pairs looked at per lag; the standard error of a correlation is then 0.01.
 const PAIRS: usize = 10_000;
 
-#[cfg(test)]
 impl Correlation {
     /// Of pixels that have nothing in common.
     pub fn white() -> Self {

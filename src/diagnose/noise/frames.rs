@@ -1,12 +1,15 @@
-//! Frames that are noisier than the others of their view: an exposure that has not settled.
+//! Frames that are noisier than the others of their view: one in all views, as where an exposure has not settled, or
+//! now this one and now that, as under a lamp that flickers.
 
 use serde_json::json;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::one;
 use crate::diagnose::options::FRAMES_KEPT;
+use crate::stats::Correlation;
 use crate::terms::{Axis, Statistic};
 
 /// The frame that stands out most in all views.
@@ -35,6 +38,46 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
     })
 }
 
+/// Frames' log variances scatter by this factor more before it is told: heavy tails alone may double it.
+const MUCH: f64 = 2.0;
+
+/// Frames that are now noisier and now quieter than chance has it, by what their logarithms scatter.
+pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
+    let (mut ratio, mut freedom, mut beyond) = (0.0, 0.0, 0.0);
+    for s in views {
+        let logs: Vec<f64> = s.frame_log_variance.iter().flatten().copied().collect();
+        let (n, [_, of_rows]) = (logs.len() as f64, s.excess_of_rows(&Correlation::white()));
+        // Each frame's logarithm is over the mean of the others': n / (n - 1) of what it is off their common mean.
+        let squares: f64 = logs.iter().map(|x| (x * (n - 1.0) / n).powi(2)).sum();
+        let expected = 2.0 * s.repeats() * of_rows / s.pixels;
+        if n > 1.0 && expected.is_finite() {
+            ratio += squares / expected;
+            freedom += n - 1.0;
+            beyond += squares - (n - 1.0) * expected;
+        }
+    }
+    let p = ChiSquared::new(freedom).ok()?.sf(ratio / MUCH);
+    if !(p < level && beyond > 0.0) {
+        return None;
+    }
+    let log_variance = (beyond / freedom).sqrt();
+    let larger = ratio / freedom;
+    Some(TextureFinding {
+        parameters: one(
+            "spread_of_log_variance",
+            log_variance,
+            log_variance / (2.0 * freedom).sqrt(),
+        ),
+        size_sigma: (0.5 * log_variance).exp() - 1.0,
+        p: p.max(1e-300),
+        nats: 0.5 * freedom * (larger - 1.0 - larger.ln()),
+        words: Some(
+            "now one and now another frame of a view has more noise than the others".into(),
+        ),
+        ..TextureFinding::named(vec![], Statistic::Variance, Axis::Frame)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use rand_distr::{Distribution, StandardNormal};
@@ -52,9 +95,31 @@ mod tests {
                 (0..5000).map(|_| (size * one()) as f32).collect()
             };
             let frames = [first, 1.0, 1.0, 1.0].map(&mut frame);
-            Structure { frame_log_variance: frame_log_variance(&frames), ..Structure::default() }
+            Structure {
+                pixels: 5000.0,
+                variance_px2: 1.0,
+                frame_log_variance: frame_log_variance(&frames),
+                ..Structure::default()
+            }
         };
         (0..12).map(view).collect()
+    }
+
+    #[test]
+    fn frames_that_flicker_are_told_from_those_that_do_not() {
+        let flickering = |name: &str, by: f64| -> Vec<Structure> {
+            let of = |v: u64| {
+                let [a, b] = [f64::from(v as u32 % 3), f64::from(v as u32 / 3 % 3)];
+                // One that is louder, and now another.
+                views(&format!("{name}/{v}"), 1.0 + by * (a - b) / 2.0).swap_remove(v as usize)
+            };
+            (0..12).map(of).collect()
+        };
+        let found = flicker(&flickering("flicker", 0.3), 1e-3).expect("flicker");
+        assert!(found.size_sigma > 0.05, "{found:?}");
+        for seed in 0..20 {
+            assert!(flicker(&flickering(&format!("none/{seed}"), 0.0), 1e-3).is_none());
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
 use frame_means::{frame_means, jitter_px2};
 use frame_tilts::frame_tilts;
-use frames::unequal;
+use frames::{flicker, unequal};
 use in_time::in_time;
 use pairs::{REACH_PX, window_of};
 use some_views::some_views;
@@ -52,15 +52,29 @@ pub fn texture_findings(
         .find(|h| h.families.first() == Some(&"temporal-correlation"))
         .and_then(|h| h.parameters["rho"]["value"].as_f64())
         .unwrap_or(0.0);
-    let means = frame_means(views, known, level, rho);
-    found.extend(frame_tilts(views, jitter_px2(&means, known), level));
-    found.extend(means);
+    found.extend(frame_means(views, known, level, rho));
     found.extend(unequal(views, level));
     found
 }
 
+/// Further mismatches of a recording by itself, beside those that were `found`: beside a simulation, views and frames
+/// differ for no reason that could be told.
+pub fn further_textures(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+    found: &[TextureFinding],
+) -> Vec<TextureFinding> {
+    let mut all = textures_of_some(views, known, level, found);
+    all.extend(frame_tilts(views, jitter_px2(found, known), level));
+    let of_frames =
+        |f: &TextureFinding| f.statistic == Statistic::Variance && f.axis == Axis::Frame;
+    all.extend((!found.iter().any(of_frames)).then(|| flicker(views, level)).flatten());
+    all
+}
+
 /// Textures that some of the views have, beside those that were `found` of all.
-pub fn textures_of_some(
+fn textures_of_some(
     views: &[Structure],
     known: &KnownTerms,
     level: f64,

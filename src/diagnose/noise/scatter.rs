@@ -6,7 +6,7 @@ use super::still::beside_bias;
 use super::structure::{Structure, structures};
 use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
-use super::{ROW_NOISE, texture_findings, textures_of_some, window};
+use super::{ROW_NOISE, further_textures, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
 use crate::diagnose::case::{Case, MeanResult};
 use crate::diagnose::finding::pixels::{
@@ -137,10 +137,13 @@ impl Case<'_> {
             }
         }
         let mut textures = texture_findings(structure, &self.known, each);
-        let of_some = textures_of_some(structure, &self.known, each, &textures);
+        let further = self
+            .baseline
+            .is_none()
+            .then(|| further_textures(structure, &self.known, each, &textures));
         textures.retain(|h| self.stands(h.p, each));
-        // The other views are what these are held against, and no model.
-        textures.extend(of_some.into_iter().filter(|_| self.baseline.is_none()));
+        // The other views and frames are what these are held against, and no model.
+        textures.extend(further.into_iter().flatten());
         if shrunk && !textures.iter().any(|h| h.families.contains(&"spatial-correlation")) {
             textures.extend(window(structure, &self.known, NAMED_LEVEL));
         }

@@ -72,6 +72,12 @@ impl Structure {
         Some([disparity, self.moments.get(1).map_or(Some(disparity), Moments::excess)?])
     }
 
+    /// Pixels that a square of the noise is shared by: the squared correlation of a box sums to this.
+    pub fn repeats(&self) -> f64 {
+        let side = self.window_px.unwrap_or(1.0).max(1.0);
+        ((2.0 * side * side + 1.0) / (3.0 * side)).powi(2)
+    }
+
     /// Skewness of the disparity, and of the depth: of noise of s times the disparity 6 s less.
     pub fn skewness(&self) -> Option<[f64; 2]> {
         let disparity = self.moments.first()?.skewness()?;

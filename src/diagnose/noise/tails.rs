@@ -107,12 +107,10 @@ fn far_out(
     })
 }
 
-/// Readings that were looked at, by how much of the noise is a pixel's own: what a box of neighbours shares
-/// is far out in all of them. Its squared correlation sums to this along either axis.
+/// Readings that were looked at, by how much of the noise is a pixel's own: what a box of neighbours shares is far
+/// out in all of them.
 fn independent_readings(view: &Structure) -> f64 {
-    let side = view.window_px.unwrap_or(1.0).max(1.0);
-    let repeats = (2.0 * side * side + 1.0) / (3.0 * side);
-    view.tails.n / repeats.powi(2)
+    view.tails.n / view.repeats()
 }
 
 /// The parameter that tells a finding of [`weak`] from one of far errors.
