@@ -60,8 +60,15 @@ pub fn unname(f: &mut Finding) {
     f.physics = physics(f.status, None, f.statistic, f.axis, None);
 }
 
+/// Last of all: how sure its names are, whether it has one, and whether the extended model has it.
+pub fn finish(f: &mut Finding) {
+    temper(&mut f.alternatives);
+    resembles_only(f);
+    tell_if_held(f);
+}
+
 /// Says of what has no name whether the extended model has it.
-pub fn tell_if_held(f: &mut Finding) {
+fn tell_if_held(f: &mut Finding) {
     if f.status == Status::Unexplained {
         f.physics += match f.terms.is_empty() {
             true => " The extended model has no term for it.",
@@ -72,7 +79,7 @@ pub fn tell_if_held(f: &mut Finding) {
 
 /// A name that is less probable than that the cause has none of those told is no name: what was found is
 /// told as what it resembles.
-pub fn resembles_only(f: &mut Finding) {
+fn resembles_only(f: &mut Finding) {
     let stated: Option<Vec<f64>> = f.alternatives.iter().map(|a| a.probability).collect();
     let own =
         f.alternatives.iter().find(|a| Some(a.effect) == f.effect).and_then(|a| a.probability);

@@ -233,11 +233,8 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
         parameters.insert("share".into(), estimate(band.share[0].min(1.0), band.share[1]));
     }
     parameters.insert("side".into(), json!(["left", "right"][band.side]));
-    let (mut lost, mut asked) = (0.0, 0.0);
-    for f in fields {
-        lost += f.edges.lost_px(band.side);
-        asked += f.pixels.len() as f64;
-    }
+    let lost: f64 = fields.iter().map(|f| f.edges.lost_px(band.side)).sum();
+    let asked: f64 = fields.iter().map(|f| f.pixels.len() as f64).sum();
     let family = band.lawful.then_some("occlusion-shadow");
     let finding = Finding {
         interval: [0.0, band.curve.y.iter().copied().fold(0.0, f64::max)],
@@ -250,9 +247,8 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
     };
     let rivals = [("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])];
     let mut finding = described(finding, family, &rivals, None);
-    if let Some([some, all]) = band.of_some {
-        finding.physics += &format!(" Measured here: in {some} of {all} views.");
-    }
+    let of_some = |[some, all]: [usize; 2]| format!(" Measured here: in {some} of {all} views.");
+    finding.physics += &band.of_some.map_or(String::new(), of_some);
     finding
 }
 

@@ -2,94 +2,16 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::frame_series::AboutLine;
+use super::frame_series::TiltScatter;
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
 use crate::diagnose::finding::parameters::one;
-use crate::diagnose::views::field::{CLIP_SIGMAS, Field};
 use crate::terms::{Axis, Statistic};
 
 /// The frames' slopes scatter by this factor more before it is told, as their means before they jitter: what pixels
 /// share beyond a window's reach is not in their noise.
 const MUCH: f64 = 2.0;
-
-/// How the slopes of a view's frames scatter about a line in time, along both axes of the picture together.
-#[derive(Debug, Clone, Copy)]
-pub struct TiltScatter {
-    /// Sum of squares, px^2 at one standard deviation of the target's pixels from its middle.
-    pub sum_px2: f64,
-    pub freedom: f64,
-    /// What the pixels' own noise lets one expect for the sum over the freedom, px^2.
-    pub expected_px2: f64,
-}
-
-impl TiltScatter {
-    /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three.
-    /// Where the noise is larger far from the middle, as on a tilted target, slopes err by more.
-    pub fn of(field: &Field, mean_px2: f64) -> Option<Self> {
-        let times: Vec<f64> = field.frames.iter().map(|f| f.0).collect();
-        let axes = axes(field)?;
-        let slopes: Vec<[f64; 2]> = field.first.iter().map(|r| slopes(field, r, &axes)).collect();
-        let n = slopes.len();
-        let of_axis = |axis: usize| {
-            let series = times.iter().zip(&slopes).map(|(t, s)| (*t, s[axis]));
-            AboutLine::of(&series.collect::<Vec<_>>()).map(|line| line.scatter)
-        };
-        let sum_px2 = of_axis(0)? + of_axis(1)?;
-        let freedom = 2.0 * (n as f64 - 2.0);
-        let noise = || field.sigma.iter().map(|s| f64::from(*s).powi(2));
-        let apart = axes.iter().zip(noise()).map(|([u, v], px2)| 0.5 * (u * u + v * v) * px2);
-        let lever = apart.sum::<f64>() / noise().sum::<f64>();
-        let expected_px2 = lever * mean_px2;
-        (expected_px2 > 0.0).then_some(TiltScatter { sum_px2, freedom, expected_px2 })
-    }
-
-    /// Per degree of freedom, beyond what is expected, px^2.
-    pub fn beyond_px2(&self) -> f64 {
-        self.sum_px2 / self.freedom - self.expected_px2
-    }
-}
-
-/// Places of the target's pixels along two axes, uncorrelated and of unit variance.
-fn axes(field: &Field) -> Option<Vec<[f64; 2]>> {
-    let n = field.pixels.len() as f64;
-    let width = field.width as u32;
-    let at = |&i: &u32| [f64::from(i % width), f64::from(i / width)];
-    let mut all: Vec<[f64; 2]> = field.pixels.iter().map(at).collect();
-    for axis in [0, 1] {
-        let mean = all.iter().map(|p| p[axis]).sum::<f64>() / n;
-        all.iter_mut().for_each(|p| p[axis] -= mean);
-        if axis == 1 {
-            let shared = all.iter().map(|p| p[0] * p[1]).sum::<f64>() / n;
-            all.iter_mut().for_each(|p| p[1] -= shared * p[0]);
-        }
-        let spread = (all.iter().map(|p| p[axis].powi(2)).sum::<f64>() / n).sqrt();
-        if !(spread > 0.0) {
-            return None;
-        }
-        all.iter_mut().for_each(|p| p[axis] /= spread);
-    }
-    Some(all)
-}
-
-/// Slopes of a frame's residuals, px at one standard deviation from the middle.
-fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> [f64; 2] {
-    let (mut n, mut sum, mut of_axes, mut places) = (0.0, 0.0, [0.0; 2], [0.0; 2]);
-    for ((&e, at), sigma) in residuals.iter().zip(axes).zip(&field.sigma) {
-        if e.abs() <= CLIP_SIGMAS * sigma.max(field.spread_px) {
-            let e = f64::from(e);
-            n += 1.0;
-            sum += e;
-            for axis in [0, 1] {
-                of_axes[axis] += at[axis] * e;
-                places[axis] += at[axis];
-            }
-        }
-    }
-    // Pixels that are lost move the middle.
-    [0, 1].map(|axis| (of_axes[axis] - places[axis] * sum / n) / n)
-}
 
 /// Slopes that scatter as neither noise nor what moves the frames' means by `jitter_px2` explains.
 pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<TextureFinding> {
@@ -112,4 +34,64 @@ pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<T
         words: Some("the slope over the picture changes from frame to frame".into()),
         ..TextureFinding::named(vec![], Statistic::Correlation, Axis::Frame)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::diagnose::views::field::Field;
+    use crate::plane::Plane;
+    use crate::rng::Seed;
+
+    const SIZE: [usize; 2] = [60, 40];
+    const NOISE_PX: f64 = 0.05;
+
+    /// Ten views of four frames each, whose noise is three times as large on the right as on the left, and that slope
+    /// by so much, px from the middle to one standard deviation of the places.
+    fn views(slope_px: f64) -> Vec<Structure> {
+        let mut rng = Seed(8).stream("frame-tilts");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let [width, height] = SIZE;
+        let n = width * height;
+        let size = |i: usize| NOISE_PX * (1.0 + 2.0 * (i % width) as f64 / width as f64);
+        let place = |i: usize| {
+            ((i % width) as f64 - 0.5 * (width as f64 - 1.0)) / (width as f64 / 12f64.sqrt())
+        };
+        let view = |_| {
+            let mut frame = || {
+                let slope = slope_px * normal();
+                (0..n).map(|i| (slope * place(i) + size(i) * normal()) as f32).collect()
+            };
+            let field = Field {
+                sigma: (0..n).map(|i| size(i) as f32).collect(),
+                spread_px: NOISE_PX as f32,
+                first: (0..4).map(|_| frame()).collect(),
+                frames: (0..4).map(|k| (f64::from(k) / 30.0, 0.0)).collect(),
+                ..Field::unseen(Plane::tilted(1.0, 0.0, 0.0), 10.0, SIZE, (0..n as u32).collect())
+            };
+            let variance_px2 = (0..n).map(|i| size(i).powi(2)).sum::<f64>() / n as f64;
+            let tilts = TiltScatter::of(&field, variance_px2 / n as f64);
+            Structure { variance_px2, tilts, ..Structure::default() }
+        };
+        (0..10).map(view).collect()
+    }
+
+    /// Slopes err as is expected of them: the ratio of 40 degrees of freedom is 1 to 0.22.
+    #[test]
+    fn slopes_are_found_with_their_size_and_noise_has_none() {
+        let still = views(0.0);
+        let ratio =
+            |s: &Structure| s.tilts.map(|t| t.sum_px2 / t.freedom / t.expected_px2).expect("tilts");
+        let mean = still.iter().map(ratio).sum::<f64>() / 10.0;
+        assert!((mean - 1.0).abs() < 0.5, "{mean}");
+        assert!(frame_tilts(&still, 0.0, 1e-3).is_none());
+        let found = frame_tilts(&views(0.01), 0.0, 1e-3).expect("slopes");
+        // One of two axes has it: a half of the squares.
+        let told = found.parameters["sigma_px"]["value"].as_f64().unwrap();
+        assert!((told / (0.01 / 2f64.sqrt()) - 1.0).abs() < 0.4, "{told}");
+        // No more than what shifts the frames.
+        assert!(frame_tilts(&views(0.01), 1e-4, 1e-3).is_none());
+    }
 }

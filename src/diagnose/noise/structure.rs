@@ -4,8 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::frame_series::Jitter;
-use super::frame_tilts::TiltScatter;
+use super::frame_series::{Jitter, TiltScatter};
 use super::moments::Moments;
 use super::pairs::Pairs;
 use super::still::{KeptPattern, beside_bias, still};
