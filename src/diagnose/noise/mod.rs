@@ -231,4 +231,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
 }
 
 #[cfg(test)]
+#[path = "further_tests.rs"]
+mod further_tests;
+#[cfg(test)]
 mod tests;

@@ -11,7 +11,7 @@ use super::view_mean::Weight;
 const FEWEST: usize = 3;
 const FEWEST_SHARE: f64 = 0.2;
 /// Fewer views below what is expected do not tell how far views scatter.
-const FEWEST_BELOW: usize = 4;
+const FEWEST_BELOW: usize = 3;
 /// A view is one of those where as far above is this improbable.
 const CLEAR: f64 = 0.01;
 

@@ -154,9 +154,9 @@ mod tests {
 
     const PATTERN_PX: f64 = 0.01;
 
-    /// Without noise, on targets of very different sizes, with this error at each pixel: what pixels, columns
-    /// and rows have in common, over the error's variance.
-    fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 3]> {
+    /// Without noise, on targets of very different sizes, with this error at each pixel: what pixels, columns,
+    /// rows and means over a few pixels have in common, over the error's variance.
+    fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 4]> {
         let camera = kinect_v1(1).camera;
         let (width, height) = (camera.width, camera.height);
         let fields: Vec<Field> = [36, 48, 60, 100, 160, 220]
@@ -174,7 +174,7 @@ mod tests {
             })
             .into();
         let kept = KeptPattern::of(&fields);
-        let all = |s: &Still| [s.fixed_px2, s.lines_px2[0], s.lines_px2[1]];
+        let all = |s: &Still| [s.fixed_px2, s.lines_px2[0], s.lines_px2[1], s.blotches_px2];
         let of_view = |s: &Still| all(s).map(|px2| px2.expect("large enough"));
         let seen = still(&beside_bias(&fields, &[]), &kept);
         seen.iter().map(|s| of_view(s).map(|px2| px2 / PATTERN_PX.powi(2))).collect()
@@ -190,12 +190,35 @@ mod tests {
         let pattern: Vec<f64> = (0..size.width * size.height).map(|_| toss()).collect();
         let seen = seen(|i| pattern[i]);
         // The coins' own products, of pixels that are not the same, make three hundredths on the smallest.
-        for [fixed, columns, rows] in &seen {
+        for [fixed, columns, rows, _] in &seen {
             let of_lines = columns.abs().max(rows.abs());
             assert!((fixed - 1.0).abs() < 0.05 && of_lines < 0.05, "{seen:?}");
         }
         let mean = seen.iter().map(|s| s[0]).sum::<f64>() / seen.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
+    }
+
+    /// A wave across the picture, 16 px from crest to crest along its diagonal: what is left of it by means over 7 px
+    /// and beside means over 49, both in one dimension along either axis, squared. A pattern of single pixels has no
+    /// part in it.
+    #[test]
+    fn waves_between_pixels_and_what_is_smooth_are_blotches() {
+        let width = kinect_v1(1).camera.width;
+        let period = 16.0 * 2f64.sqrt();
+        let phase = |i: usize| std::f64::consts::TAU * (i % width + i / width) as f64 / period;
+        let seen_wave = seen(|i| PATTERN_PX * 2f64.sqrt() * phase(i).sin());
+        let along = |side: f64| {
+            let x = std::f64::consts::PI / period;
+            ((side * x).sin() / (side * x.sin())).powi(2)
+        };
+        let passed = (along(7.0) * (1.0 - along(49.0))).powi(2);
+        let [_, _, _, largest] = seen_wave[5];
+        assert!((largest / passed - 1.0).abs() < 0.1, "{largest} of {passed}");
+        let mut rng = Seed(7).stream("still/pixels");
+        let pixels: Vec<f64> = (0..width * 480)
+            .map(|_| if rng.random_bool(0.5) { PATTERN_PX } else { -PATTERN_PX })
+            .collect();
+        assert!(seen(|i| pixels[i]).iter().all(|s| s[3].abs() < 0.01));
     }
 
     /// Every second column is two heights off its neighbours: 2/3 of four times the columns' variance. Means
@@ -205,7 +228,7 @@ mod tests {
         let width = kinect_v1(1).camera.width;
         let seen = seen(|i| if (i % width).is_multiple_of(2) { PATTERN_PX } else { -PATTERN_PX });
         let passed: f64 = (1.0 - 1.0 / 49.0) * (1.0 + 1.0 / 7.0);
-        for [fixed, columns, rows] in &seen {
+        for [fixed, columns, rows, _] in &seen {
             assert!(fixed.abs().max(rows.abs()) < 0.01, "{seen:?}");
             assert!((columns - 8.0 / 3.0 * passed * passed).abs() < 0.04, "{seen:?}");
         }
@@ -217,6 +240,6 @@ mod tests {
         let width = kinect_v1(1).camera.width as f64;
         let wave = |i: usize| (i as f64 % width / 48.0 * std::f64::consts::TAU).sin();
         let seen = seen(|i| PATTERN_PX * wave(i));
-        assert!(seen.iter().all(|[_, columns, _]| columns.abs() < 0.002), "{seen:?}");
+        assert!(seen.iter().all(|[_, columns, ..]| columns.abs() < 0.002), "{seen:?}");
     }
 }
