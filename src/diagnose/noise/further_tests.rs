@@ -19,30 +19,30 @@ fn of_five(seed: u64, add: impl Fn(&mut Structure)) -> Vec<Structure> {
 }
 
 /// What is found, and how often in twelve sessions: of nine views without it less than three lie below in one of eleven.
-fn told(add: impl Fn(&mut Structure)) -> (Option<TextureFinding>, usize) {
+fn told(id: &str, add: impl Fn(&mut Structure)) -> (TextureFinding, usize) {
     let all = (0..12).map(|seed| {
         let views = of_five(seed, &add);
         let known = KnownTerms::default();
         let found = texture_findings(&views, &known, LEVEL);
         assert!(found.is_empty(), "a mean over all tells it too: {:?}", found[0].families);
-        further_textures(&views, &known, LEVEL, &found).into_iter().next()
+        let found = further_textures(&views, &known, LEVEL, &found);
+        found.into_iter().find(|f| f.families.contains(&id))
     });
     let found: Vec<TextureFinding> = all.flatten().collect();
-    (found.first().cloned(), found.len())
+    (found.first().cloned().expect("in some session"), found.len())
 }
 
 #[test]
 fn textures_of_some_views_have_their_names_and_sizes() {
     let rows = |s: &mut Structure| s.row_px2 = s.row_px2.map(|px2| px2 + 0.004);
-    let (found, times) = told(rows);
-    let found = found.expect("rows");
-    assert!(times >= 7 && found.of_some && found.families == ["row-noise"], "{times}");
+    let (found, times) = told("row-noise", rows);
+    assert!(times >= 7 && found.of_some, "{times}");
     assert_eq!(found.words.as_deref(), Some("in 5 of 14 views"));
     let [sigma, error] = parameter(&found, "sigma_px");
     assert!((sigma - 0.004f64.sqrt()).abs() < 4.0 * error.max(1e-3), "{sigma}");
     let alike = |s: &mut Structure| s.lagged = s.lagged.map(|c| c.map(|c| c + 0.3));
-    let (found, times) = told(alike);
-    assert!(times >= 7 && found.is_some_and(|f| f.families == ["frozen-noise"]), "{times}");
+    let (_, times) = told("frozen-noise", alike);
+    assert!(times >= 7, "{times}");
 }
 
 /// At a thousandth, with three tests of some views: one of 400 sessions; more than 8 have a chance of 1e-5.
