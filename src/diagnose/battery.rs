@@ -172,7 +172,8 @@ impl Case<'_> {
                 && f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
         };
         let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS) && !t.of_some;
-        let textures = !scatter.textures.is_empty() || scatter.tails.is_some();
+        let of_all = |t: &TextureFinding| !t.of_some && t.statistic != Statistic::Distribution;
+        let textures = scatter.textures.iter().any(of_all) || scatter.tails.is_some();
         let textured = scatter.tails.as_ref().is_some_and(far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;

@@ -91,6 +91,9 @@ pub struct Finding {
     /// What it looks like over its axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curve: Option<Curve>,
+    /// Only some of the views have it, and no model of the sensor does.
+    #[serde(skip)]
+    pub of_some: bool,
     /// The effect of the model that the views contradict; such a finding has no name of its own.
     #[serde(skip)]
     pub contradicted: Option<&'static str>,

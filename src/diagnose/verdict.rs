@@ -130,7 +130,7 @@ pub(super) fn extend<'a>(
     let fit = 1 + fits.max().unwrap_or(0);
     for f in found {
         let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
-        if !keeps {
+        if !keeps || f.of_some {
             continue;
         }
         let id = match (f.status, f.effect) {
@@ -183,10 +183,11 @@ impl Diagnosis {
 }
 
 impl Finding {
-    /// Has it a part in the score of views kept aside? Losses, a step, an edge, a law of the distance, and what has no
-    /// terms and no name have none.
+    /// Has it a part in the score of views kept aside? Losses, a step, an edge, a law of the distance, what has no
+    /// terms and no name, and what some views have alone have none.
     pub fn is_scored(&self) -> bool {
         match self.statistic {
+            _ if self.of_some => false,
             Statistic::Bias if self.axis == Axis::Frame => self.effect.is_some(),
             Statistic::Bias | Statistic::Variance => self.curve.is_some() && !self.terms.is_empty(),
             Statistic::Dropout => false,

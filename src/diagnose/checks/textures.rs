@@ -20,7 +20,7 @@ use crate::terms::{Axis, Statistic};
 /// A view's value beyond what the model has, in the statistic's own unit.
 type OfView<'a> = Box<dyn Fn(&Structure) -> Option<f64> + 'a>;
 
-/// `None` where the finding is no mean of the views, or a half has too few of them.
+/// `None` where the finding is no mean of all views, or a half has too few of them.
 pub fn replicated(
     found: &TextureFinding,
     structure: &[Structure],
@@ -28,6 +28,9 @@ pub fn replicated(
     second: &[bool],
     known: &KnownTerms,
 ) -> Option<bool> {
+    if found.of_some {
+        return None;
+    }
     let beyond = beyond_known(found, known);
     let half = |which: bool| {
         let mine = second.iter().enumerate().filter(|(_, s)| **s == which).map(|(v, _)| v);

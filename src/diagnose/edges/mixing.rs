@@ -116,15 +116,15 @@ fn best(edges: &[&Edges], twins: Option<&[&Edges]>, widths: &[f64]) -> Option<Fo
     seen.max_by(|a, b| a.1.1.total_cmp(&b.1.1))
 }
 
-/// Views whose edges mix while the others' do not, and the chance of it.
-fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, f64)> {
+/// Views whose edges mix while the others' do not, among so many, and the chance of it.
+fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, usize, f64)> {
     let at = |width: &f64| {
         let sure = |e: &&'a Edges| share(e, *width).map(|(value, sure)| (*e, value * sure.sqrt()));
         let (seen, off): (Vec<&Edges>, Vec<f64>) = edges.iter().filter_map(sure).unzip();
         let some = SomeViews::above(&off)?;
-        Some((some.which.iter().map(|&v| seen[v]).collect::<Vec<_>>(), some.p))
+        Some((some.which.iter().map(|&v| seen[v]).collect::<Vec<_>>(), seen.len(), some.p))
     };
-    TRIED_PX.iter().filter_map(at).min_by(|a, b| a.1.total_cmp(&b.1))
+    TRIED_PX.iter().filter_map(at).min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
 /// Depth mixed at the edge, where the views, or some of them, agree on it at this level.
@@ -138,10 +138,10 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<T
         return found(&edges, best(&edges, twins, &WIDTHS_PX)?, p);
     }
     // The second test at this level.
-    let (some, p) = twins.is_none().then(|| mixing_views(&edges)).flatten()?;
+    let (some, of, p) = twins.is_none().then(|| mixing_views(&edges)).flatten()?;
     let p = 2.0 * tried * p;
     let footprint = (p <= level).then(|| best(&some, None, &WIDTHS_PX)).flatten()?;
-    Some(found(&some, footprint, p)?.of_some(some.len(), edges.len(), p))
+    Some(found(&some, footprint, p)?.of_some([some.len(), of], p))
 }
 
 fn found(edges: &[&Edges], (width, (share, _)): Footprint, p: f64) -> Option<TextureFinding> {

@@ -217,3 +217,33 @@ fn a_band_is_a_shadow_when_it_is_on_one_side_and_as_wide_as_it_must_be() {
     assert!(band(&shadows(|_| [0.0, 0.0]), 1e-3).is_none());
     assert!(band(&shadows(|e| [f64::from(e > 25.0), 0.0]), 1e-3).is_none(), "a stray pixel");
 }
+
+/// The last three of ten views lose what geometry has, on the right; single pixels on the left are lost in all.
+#[test]
+fn a_shadow_of_some_views_is_told_with_how_many() {
+    let last = |e: f64| if e > 21.0 { 0.9 * e } else { 0.0 };
+    let found = band(&shadows(|e| [0.0, last(e)]), 1e-3).expect("a shadow");
+    assert_eq!((found.of_some, found.side), (Some([3, 10]), 1));
+    assert!(found.lawful && (found.share[0] - 0.9).abs() < 0.05, "{found:?}");
+    let lines = |e: f64| if e > 21.0 { 1.0 } else { 0.0 };
+    assert!(band(&shadows(|e| [0.0, lines(e)]), 1e-3).is_none(), "a line is what a border errs by");
+}
+
+/// Four of fourteen views have footprints of 4 px to either side.
+#[test]
+fn mixing_of_some_views_is_told_with_how_many() {
+    let mixed = |inside: isize, _: &mut Stream| {
+        let seen = 0.5 * (1.0 - (inside as f64 + 0.5) / 4.0).max(0.0);
+        Some(if inside >= 0 { seen } else { 0.0 })
+    };
+    let clean = |_: isize, _: &mut Stream| Some(0.0);
+    let mut all = views(21, &clean);
+    all.truncate(10);
+    let mut some = views(22, &mixed);
+    some.truncate(4);
+    all.extend(some);
+    let found = mixing(&all, None, 1e-3).expect("mixing");
+    assert!(found.families == ["edge-mixing"]);
+    let words = found.words.unwrap();
+    assert!(found.of_some && words.ends_with("in 4 of 14 views"), "{words}");
+}

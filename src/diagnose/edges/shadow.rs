@@ -97,31 +97,35 @@ pub fn band(views: &[Sides], level: f64) -> Option<Band> {
     if all.p <= level {
         return Some(all);
     }
-    let (some, p) = [0, 1]
-        .iter()
-        .filter_map(|side| shaded_views(views, *side))
-        .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    // Two sides, and the second test at this level.
-    let p = 4.0 * p;
-    let of_some = Some([some.len(), views.len()]);
-    (p <= level).then(|| Some(Band { p, of_some, ..band_of(&some)? }))?
+    let sides = [0, 1].iter().filter_map(|side| shaded_views(views, *side));
+    sides.min_by(|a, b| a.p.total_cmp(&b.p)).filter(|b| b.p <= level)
 }
 
-/// Views that lose more on this side than a border errs by, and the chance of it.
-fn shaded_views(views: &[Sides], side: usize) -> Option<(Vec<Sides>, f64)> {
+/// The band of those views that lose more on this side than a border errs by.
+fn shaded_views(views: &[Sides], side: usize) -> Option<Band> {
     let seen: Vec<(Sides, EdgeLoss)> =
         views.iter().filter_map(|s| Some((*s, s.0[side]?))).collect();
     let widths: Vec<f64> = seen.iter().map(|(_, v)| v.lost / v.rows).collect();
-    // As sure as a constant of a measurement is.
-    let some = SomeViews::beyond(&widths, BORDER_PX, 30)?;
-    Some((some.which.iter().map(|&v| seen[v].0).collect(), some.p))
+    let some = SomeViews::beyond(&widths, BORDER_PX, OF_A_CONSTANT)?;
+    let shaded: Vec<Sides> = some.which.iter().map(|&v| seen[v].0).collect();
+    // Two sides, and the second test at this level.
+    let p = (4.0 * some.p).min(1.0);
+    let of_some = Some([shaded.len(), seen.len()]);
+    Some(Band { p, of_some, ..band_on(&shaded, side)? })
 }
 
-/// What the views agree on, whatever the chance of it.
+/// Degrees of freedom of what is no estimate of these views: with so many Student's t is normal.
+const OF_A_CONSTANT: usize = 1000;
+
+/// What the views agree on, whatever the chance of it, on the side that loses more.
 fn band_of(views: &[Sides]) -> Option<Band> {
+    let [left, right] = by_side(views).map(|(_, share)| share.map_or(0.0, |share| share.value));
+    band_on(views, usize::from(right > left))
+}
+
+fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     let sides = by_side(views);
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
-    let side = usize::from(share(1) > share(0));
     let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
     let student = StudentsT::new(0.0, 1.0, lawful.views - 1.0).ok()?;

@@ -45,7 +45,9 @@ pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
         let places = [Axis::Column, Axis::Row, Axis::Radius, Axis::Pixel];
         f.statistic == Statistic::Bias && places.contains(&f.axis)
     };
-    let nameless = |f: &&Finding| of_picture(f) && f.status == Status::Unexplained;
+    // A fine pattern is no rest of a smooth shape.
+    let smooth = |f: &&Finding| f.axis != Axis::Pixel || !f.terms.is_empty();
+    let nameless = |f: &&Finding| of_picture(f) && f.status == Status::Unexplained && smooth(f);
     let left: f64 = found.iter().filter(nameless).map(|f| f.share).sum();
     for f in found.iter_mut().filter(|f| of_picture(f) && f.share > 0.0) {
         let sure = f.share / (f.share + left);
@@ -67,13 +69,13 @@ pub fn finish(f: &mut Finding) {
     tell_if_held(f);
 }
 
-/// Says of what has no name whether the extended model has it.
+/// Says of what has no name, and of what some views have alone, whether the extended model has it.
 fn tell_if_held(f: &mut Finding) {
-    if f.status == Status::Unexplained {
-        f.physics += match f.terms.is_empty() {
-            true => " The extended model has no term for it.",
-            false => " The extended model holds it as the curve that was measured.",
-        };
+    let nameless = f.status == Status::Unexplained && f.contradicted.is_none();
+    if nameless && !f.terms.is_empty() {
+        f.physics += " The extended model holds it as the curve that was measured.";
+    } else if nameless || f.of_some {
+        f.physics += " The extended model has no term for it.";
     }
 }
 
@@ -169,6 +171,7 @@ pub fn physics(
 mod tests {
     use super::*;
     use crate::diagnose::finding::other_findings::{named, nameless};
+    use crate::terms::{Basis, Term};
 
     /// Half of what is there without a name: half as probable. What is left on another axis, or of
     /// another statistic, takes nothing.
@@ -244,5 +247,27 @@ mod tests {
         let mut untold = [Alternative { effect: "vignetting", probability: None }];
         temper(&mut untold);
         assert_eq!(untold[0].probability, None);
+    }
+
+    /// The extended model holds the curve of one, none of what some views have, and still has what views contradict.
+    #[test]
+    fn whether_the_extended_model_has_it_is_told() {
+        let told = |change: &dyn Fn(&mut Finding)| {
+            let mut f = nameless(Statistic::Bias, Axis::Pixel);
+            change(&mut f);
+            finish(&mut f);
+            f.physics
+        };
+        let level = || Term::bias(Basis::Level, vec![1.0]);
+        assert!(
+            told(&|f| f.terms = vec![level()])
+                .ends_with("holds it as the curve that was measured.")
+        );
+        assert!(told(&|_| ()).ends_with("has no term for it."));
+        assert!(!told(&|f| f.contradicted = Some("row-noise")).contains("extended model"));
+        let mut some =
+            Finding { of_some: true, ..named("row-noise", Statistic::Correlation, Axis::Row) };
+        finish(&mut some);
+        assert!(some.physics.ends_with("has no term for it."));
     }
 }

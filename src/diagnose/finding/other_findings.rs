@@ -26,6 +26,7 @@ pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding 
         replicated: None,
         physics: physics(Status::Named, Some(effect), statistic, axis, None),
         next_view: None,
+        of_some: false,
         contradicted: None,
         shape: None,
         curve: None,
@@ -71,6 +72,7 @@ pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -
         size: Size { mm: found.size_sigma * sigma_mm, sigma: found.size_sigma },
         p_adjusted: Some(found.p),
         replicated,
+        of_some: found.of_some,
         physics: words,
         shape: found.words,
         ..named(effect.unwrap_or_default(), found.statistic, found.axis)

@@ -100,12 +100,13 @@ pub fn missing(
     if let Some(band) = band(&sides, SHADOW_LEVEL) {
         let of_all = band.of_some.is_none();
         let mut shadow = shadow_finding(band, fields);
+        shadow.of_some = !of_all;
         shadow.replicated = of_all.then(|| bands_agree(&sides, &seen.second)).flatten();
         // Where the target's own mask reaches into its shadow, the same losses are seen again; a
         // region that was given ends at the target.
         let grown = seen.region_given.contains(&false);
         let larger = |f: &Finding| f.size.sigma > shadow.size.sigma;
-        outcome.findings.retain(|f| !grown || f.effect.is_some() || larger(f));
+        outcome.findings.retain(|f| !grown || !of_all || f.effect.is_some() || larger(f));
         outcome.findings.push(shadow);
     }
     outcome

@@ -74,19 +74,22 @@ pub struct TiltScatter {
 }
 
 impl TiltScatter {
-    /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three.
-    /// Where the noise is larger far from the middle, as on a tilted target, slopes err by more.
+    /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three, of which
+    /// those that lost most pixels are none. Where the noise is larger far from the middle, as on a tilted target, slopes err by more.
     pub fn of(field: &Field, mean_px2: f64) -> Option<Self> {
-        let times: Vec<f64> = field.frames.iter().map(|f| f.0).collect();
         let axes = axes(field)?;
-        let slopes: Vec<[f64; 2]> = field.first.iter().map(|r| slopes(field, r, &axes)).collect();
-        let n = slopes.len();
+        let slopes = field.first.iter().map(|r| slopes(field, r, &axes));
+        let whole = |n: f64| n >= MIN_SHARE * field.measured_pixels();
+        let frames: Vec<(f64, [f64; 2])> = (field.frames.iter().zip(slopes))
+            .filter(|(_, (n, _))| *n > 0.0 && whole(*n))
+            .map(|((t, _), (_, slopes))| (*t, slopes))
+            .collect();
         let of_axis = |axis: usize| {
-            let series = times.iter().zip(&slopes).map(|(t, s)| (*t, s[axis]));
-            AboutLine::of(&series.collect::<Vec<_>>()).map(|line| line.scatter)
+            let series: Vec<(f64, f64)> = frames.iter().map(|(t, s)| (*t, s[axis])).collect();
+            AboutLine::of(&series).map(|line| line.scatter)
         };
         let sum_px2 = of_axis(0)? + of_axis(1)?;
-        let freedom = 2.0 * (n as f64 - 2.0);
+        let freedom = 2.0 * (frames.len() as f64 - 2.0);
         let noise = || field.sigma.iter().map(|s| f64::from(*s).powi(2));
         let apart = axes.iter().zip(noise()).map(|([u, v], px2)| 0.5 * (u * u + v * v) * px2);
         let lever = apart.sum::<f64>() / noise().sum::<f64>();
@@ -122,8 +125,11 @@ fn axes(field: &Field) -> Option<Vec<[f64; 2]>> {
     Some(all)
 }
 
-/// Slopes of a frame's residuals, px at one standard deviation from the middle.
-fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> [f64; 2] {
+/// A frame with a smaller share of the pixels that others have errs by more than they do.
+const MIN_SHARE: f64 = 0.8;
+
+/// How many pixels of a frame are looked at, and the slopes of their residuals, px at one standard deviation from the middle.
+fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> (f64, [f64; 2]) {
     let (mut n, mut sum, mut of_axes, mut places) = (0.0, 0.0, [0.0; 2], [0.0; 2]);
     for ((&e, at), sigma) in residuals.iter().zip(axes).zip(&field.sigma) {
         if e.abs() <= CLIP_SIGMAS * sigma.max(field.spread_px) {
@@ -137,5 +143,5 @@ fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> [f64; 2] {
         }
     }
     // Pixels that are lost move the middle.
-    [0, 1].map(|axis| (of_axes[axis] - places[axis] * sum / n) / n)
+    (n, [0, 1].map(|axis| (of_axes[axis] - places[axis] * sum / n) / n))
 }

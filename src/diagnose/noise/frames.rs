@@ -49,7 +49,7 @@ pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
         let (n, [_, of_rows]) = (logs.len() as f64, s.excess_of_rows(&Correlation::white()));
         // Each frame's logarithm is over the mean of the others': n / (n - 1) of what it is off their common mean.
         let squares: f64 = logs.iter().map(|x| (x * (n - 1.0) / n).powi(2)).sum();
-        let expected = 2.0 * s.repeats() * of_rows / s.pixels;
+        let expected = 2.0 * s.repeats() * of_rows / s.frame_pixels;
         if n > 1.0 && expected.is_finite() {
             ratio += squares / expected;
             freedom += n - 1.0;
@@ -80,6 +80,7 @@ pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
 
 #[cfg(test)]
 mod tests {
+    use rand::Rng;
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
@@ -95,30 +96,47 @@ mod tests {
                 (0..5000).map(|_| (size * one()) as f32).collect()
             };
             let frames = [first, 1.0, 1.0, 1.0].map(&mut frame);
-            Structure {
-                pixels: 5000.0,
-                variance_px2: 1.0,
-                frame_log_variance: frame_log_variance(&frames),
-                ..Structure::default()
-            }
+            let (frame_log_variance, _) = frame_log_variance(&frames);
+            Structure { frame_log_variance, ..Structure::default() }
         };
         (0..12).map(view).collect()
     }
 
-    #[test]
-    fn frames_that_flicker_are_told_from_those_that_do_not() {
-        let flickering = |name: &str, by: f64| -> Vec<Structure> {
-            let of = |v: u64| {
-                let [a, b] = [f64::from(v as u32 % 3), f64::from(v as u32 / 3 % 3)];
-                // One that is louder, and now another.
-                views(&format!("{name}/{v}"), 1.0 + by * (a - b) / 2.0).swap_remove(v as usize)
+    /// Twelve views, of whose four frames each is louder or quieter by a Gaussian of this size in the logarithm of
+    /// its standard deviation; a share of the readings is lost.
+    fn flickering(seed: u64, by: f64, lost: f64) -> Vec<Structure> {
+        let mut rng = Seed(seed).stream("flicker");
+        let mut view = || {
+            let mut frame = || -> Vec<f32> {
+                let of_frame: f64 = StandardNormal.sample(&mut rng);
+                let size = (by * of_frame).exp();
+                let mut one = || {
+                    let x: f64 = StandardNormal.sample(&mut rng);
+                    if rng.random::<f64>() < lost { f32::NAN } else { (size * x) as f32 }
+                };
+                (0..5000).map(|_| one()).collect()
             };
-            (0..12).map(of).collect()
+            let (frame_log_variance, frame_pixels) = frame_log_variance(&[(); 4].map(|()| frame()));
+            let (pixels, variance_px2) = (5000.0 * (1.0 - lost), 1.0);
+            Structure {
+                pixels,
+                variance_px2,
+                frame_log_variance,
+                frame_pixels,
+                ..Structure::default()
+            }
         };
-        let found = flicker(&flickering("flicker", 0.3), 1e-3).expect("flicker");
-        assert!(found.size_sigma > 0.05, "{found:?}");
-        for seed in 0..20 {
-            assert!(flicker(&flickering(&format!("none/{seed}"), 0.0), 1e-3).is_none());
+        (0..12).map(|_| view()).collect()
+    }
+
+    /// The variance's logarithm changes by twice as much as that of the standard deviation, to 1 / sqrt(2 * 36).
+    #[test]
+    fn frames_that_flicker_are_told_with_their_size_and_others_are_not() {
+        let found = flicker(&flickering(1, 0.1, 0.3), 1e-3).expect("flicker");
+        let told = found.parameters["spread_of_log_variance"]["value"].as_f64().unwrap();
+        assert!((told / 0.2 - 1.0).abs() < 0.4, "{told}");
+        for (seed, lost) in (0..20).flat_map(|seed| [(seed, 0.0), (seed, 0.4)]) {
+            assert!(flicker(&flickering(seed, 0.0, lost), 1e-3).is_none(), "{lost}");
         }
     }
 

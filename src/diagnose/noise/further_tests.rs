@@ -12,6 +12,11 @@ fn of_five(seed: u64, add: impl Fn(&mut Structure)) -> Vec<Structure> {
     let mut number = 0;
     with(&mut rng, |s| {
         number += 1;
+        // Far views have thirty times the noise of near ones, and rows that err by as much more.
+        let far = 30f64.powf(f64::from(number) / 14.0);
+        s.variance_px2 *= far;
+        s.row_px2 = s.row_px2.map(|px2| px2 * far);
+        s.neighbour_correlation = Some(0.0);
         if (5..10).contains(&number) {
             add(s);
         }
@@ -34,24 +39,26 @@ fn told(id: &str, add: impl Fn(&mut Structure)) -> (TextureFinding, usize) {
 
 #[test]
 fn textures_of_some_views_have_their_names_and_sizes() {
-    let rows = |s: &mut Structure| s.row_px2 = s.row_px2.map(|px2| px2 + 0.004);
+    let rows = |s: &mut Structure| s.row_px2 = s.row_px2.map(|px2| px2 + 0.1 * s.variance_px2);
     let (found, times) = told("row-noise", rows);
     assert!(times >= 7 && found.of_some, "{times}");
     assert_eq!(found.words.as_deref(), Some("in 5 of 14 views"));
+    // A tenth of .04 px^2 by 30^(5/14) to 30^(9/14): .12 to .19 px.
     let [sigma, error] = parameter(&found, "sigma_px");
-    assert!((sigma - 0.004f64.sqrt()).abs() < 4.0 * error.max(1e-3), "{sigma}");
+    assert!((0.1..0.2).contains(&sigma) && error < 0.05, "{sigma} {error}");
     let alike = |s: &mut Structure| s.lagged = s.lagged.map(|c| c.map(|c| c + 0.3));
     let (_, times) = told("frozen-noise", alike);
     assert!(times >= 7, "{times}");
 }
 
-/// At a thousandth, with three tests of some views: one of 400 sessions; more than 8 have a chance of 1e-5.
+/// Two tests of some views at half of a hundredth each: 40 of 4000 sessions, give or take 6.3, but for those without a
+/// scale or a name.
 #[test]
-fn sessions_of_nothing_have_no_texture_of_some() {
-    let found = (0..400).filter(|seed| {
+fn sessions_of_nothing_have_a_texture_of_some_as_often_as_the_level_says() {
+    let found = (0..4000).filter(|seed| {
         let views = of_five(1000 + seed, |_| {});
-        !further_textures(&views, &KnownTerms::default(), LEVEL, &[]).is_empty()
+        !textures_of_some(&views, &KnownTerms::default(), 0.01, &[]).is_empty()
     });
     let found = found.count();
-    assert!(found <= 8, "{found} of 400");
+    assert!((5..60).contains(&found), "{found} of 4000");
 }

@@ -7,6 +7,8 @@ use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
 
+/// Pixels that err by a constant each.
+pub const FIXED_PATTERN: &str = "fixed-pattern-noise";
 /// Share of the variance that pixels repeat in every view, worth a word.
 const LEAST_FIXED: f64 = 0.0003;
 /// Below this chance a fall of the correlation is not put down to noise alone.
@@ -37,9 +39,9 @@ fn of_frames(
 pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let fixed = ViewMean::of_pairs(views, |s| s.fixed_px2);
     let variance = variance_px2(views);
-    let known_px = known.parameter("fixed-pattern-noise", "sigma_px").unwrap_or(0.0);
+    let known_px = known.parameter(FIXED_PATTERN, "sigma_px").unwrap_or(0.0);
     let pattern = Shared {
-        families: vec!["fixed-pattern-noise"],
+        families: vec![FIXED_PATTERN],
         statistic: Statistic::Bias,
         axis: Axis::Pixel,
         expected_px2: known_px * known_px,

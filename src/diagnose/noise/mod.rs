@@ -29,7 +29,7 @@ use crate::terms::{Axis, Statistic};
 use frame_means::{frame_means, jitter_px2};
 use frame_tilts::frame_tilts;
 use frames::{flicker, unequal};
-use in_time::in_time;
+use in_time::{FIXED_PATTERN, in_time};
 use pairs::{REACH_PX, window_of};
 use some_views::some_views;
 use structure::Structure;
@@ -54,7 +54,20 @@ pub fn texture_findings(
         .unwrap_or(0.0);
     found.extend(frame_means(views, known, level, rho));
     found.extend(unequal(views, level));
+    tell_pattern_once(&mut found);
     found
+}
+
+/// A pattern whose grain is a few pixels wide is seen in pixels and in their means.
+fn tell_pattern_once(found: &mut Vec<TextureFinding>) {
+    let of_pixels = found.iter().any(|f| f.families == [FIXED_PATTERN]);
+    let of_means = |f: &TextureFinding| f.families.is_empty() && f.axis == Axis::Pixel;
+    let coarse = found.iter().any(of_means);
+    if of_pixels && coarse {
+        found.retain(|f| !of_means(f));
+        let named = found.iter_mut().find(|f| f.families == [FIXED_PATTERN]);
+        named.into_iter().for_each(|f| f.words = Some("its grain is wider than a pixel".into()));
+    }
 }
 
 /// Further mismatches of a recording by itself, beside those that were `found`: beside a simulation, views and frames
@@ -82,30 +95,32 @@ fn textures_of_some(
 ) -> Vec<TextureFinding> {
     type OfView = fn(&Structure) -> Option<f64>;
     type OfAll = fn(&[Structure], &KnownTerms, f64) -> Vec<TextureFinding>;
-    let in_known = |id, name| known.parameter(id, name).unwrap_or(0.0);
-    let in_time_known =
-        in_known("frozen-noise", "fraction") + in_known("temporal-correlation", "rho");
-    let rows_known = in_known(ROW_NOISE, "sigma_px").powi(2);
-    // Of a window no view's correlation is known to lie as far to either side.
-    let windowless = if expected_window(known) > 1.0 { f64::NAN } else { 0.0 };
-    let all: [(&[&str], OfView, f64, OfAll); 3] = [
-        (&[ROW_NOISE], |s| s.row_px2, rows_known, lines),
-        (&["frozen-noise", "temporal-correlation"], |s| s.lagged[0], in_time_known, in_time),
+    // Shares of a view's own variance, so that near and far views scatter alike.
+    let all: [(&[&str], OfView, OfAll); 3] = [
+        (&[ROW_NOISE], |s| Some(s.row_px2? / s.variance_px2), lines),
+        // Rounding stands still: where it hides what neighbours share, frames are alike too.
+        (
+            &["frozen-noise", "temporal-correlation"],
+            |s| s.neighbour_correlation.and(s.lagged[0]),
+            in_time,
+        ),
         (
             &["spatial-correlation"],
             |s| s.neighbour_correlation,
-            windowless,
             |views, known, level| window(views, known, level).into_iter().collect(),
         ),
     ];
-    let told = |ids: &[&str]| found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
-    let of = |(ids, of_view, expected, of_all): (&[&str], OfView, f64, OfAll)| {
+    // About what a model has of it views need not scatter to both sides alike.
+    let told = |ids: &[&str]| {
+        let found = found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
+        found || ids.iter().any(|id| known.has(id))
+    };
+    let of = |(ids, of_view, of_all): (&[&str], OfView, OfAll)| {
         // The second test of each at this level.
-        let (these, p) =
-            some_views(views, of_view, expected).filter(|some| 2.0 * some.1 < level)?;
-        let shown = of_all(&these, known, AMONG_SOME).into_iter();
+        let some = some_views(views, of_view).filter(|some| 2.0 * some.p < level)?;
+        let shown = of_all(&some.views, known, AMONG_SOME).into_iter();
         let mut named = shown.filter(|f| f.families.iter().any(|id| ids.contains(id)));
-        Some(named.next()?.of_some(these.len(), views.len(), 2.0 * p))
+        Some(named.next()?.of_some([some.views.len(), some.of], 2.0 * some.p))
     };
     all.into_iter().filter(|test| !told(test.0)).filter_map(of).collect()
 }

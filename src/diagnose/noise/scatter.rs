@@ -4,7 +4,7 @@ use super::lines::LearntLines;
 use super::skewness::skewness;
 use super::still::beside_bias;
 use super::structure::{Structure, structures};
-use super::tails::{Confusers, tails};
+use super::tails::{Confusers, EXCESS, tails};
 use super::texture_finding::TextureFinding;
 use super::{ROW_NOISE, further_textures, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
@@ -85,10 +85,13 @@ impl Case<'_> {
         let confusers = Confusers { uneven, simulated: self.baseline.is_some(), stepped };
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
-        // Far errors to one side alone make both.
-        if tails.is_none() && self.baseline.is_none() {
-            textures.extend(skewness(&structure, each).filter(|t| self.stands(t.p, each)));
-        }
+        // Far errors to one side alone make both; what is skewed has a fourth moment.
+        let is_far = |t: &TextureFinding| !t.parameters.contains_key(EXCESS) && !t.of_some;
+        let may_be = self.baseline.is_none() && !tails.as_ref().is_some_and(is_far);
+        let skewed = may_be.then(|| skewness(&structure, each)).flatten();
+        let skewed = skewed.filter(|t| self.stands(t.p, each));
+        let tails = tails.filter(|t| skewed.is_none() || !t.parameters.contains_key(EXCESS));
+        textures.extend(skewed);
         ScatterResult { structure, textures, tails, outcome }
     }
 

@@ -10,9 +10,9 @@ use super::view_mean::Weight;
 /// Fewer views than this, and than this share of all, are odd ones.
 const FEWEST: usize = 3;
 const FEWEST_SHARE: f64 = 0.2;
-/// Fewer views below what is expected do not tell how far views scatter.
+/// Fewer views below what is expected do not tell how far views scatter: with two, half of it is chance.
 const FEWEST_BELOW: usize = 3;
-/// A view is one of those where as far above is this improbable.
+/// A view beyond the fewest is one of them where as far above is this improbable.
 const CLEAR: f64 = 0.01;
 
 /// How many views are more than odd ones.
@@ -38,32 +38,36 @@ impl SomeViews {
 
     /// Of what each view is off by, which is known to err by `scale`, as `freedom` values tell.
     pub fn beyond(off: &[f64], scale: f64, freedom: usize) -> Option<Self> {
-        let mut above: Vec<f64> = off.iter().map(|t| t / scale).filter(|t| *t > 0.0).collect();
-        let least = fewest(off.len());
-        if above.len() < least {
-            return None;
-        }
-        above.sort_by(|a, b| b.total_cmp(a));
-        let p = order_statistic(above[least - 1], least, above.len(), freedom);
+        let above = |v: &usize| off[*v] > 0.0;
+        let mut which: Vec<usize> = (0..off.len()).filter(above).collect();
+        which.sort_by(|a, b| off[*b].total_cmp(&off[*a]));
+        let (least, n) = (fewest(off.len()), which.len());
+        let p = order_statistic(off[*which.get(least - 1)?] / scale, least, n, freedom);
         let student = StudentsT::new(0.0, 1.0, freedom as f64).ok()?;
-        let clear = |v: &usize| off[*v] > 0.0 && student.sf(off[*v] / scale) < CLEAR;
-        Some(SomeViews { which: (0..off.len()).filter(clear).collect(), p })
+        let clear = which.iter().filter(|v| student.sf(off[**v] / scale) < CLEAR).count();
+        which.truncate(clear.max(least));
+        which.sort_unstable();
+        Some(SomeViews { which, p })
     }
 }
 
-/// Those of the views whose `value` lies above the others', and the chance of it.
-pub fn some_views(
-    views: &[Structure],
-    value: impl Fn(&Structure) -> Option<f64>,
-    expected: f64,
-) -> Option<(Vec<Structure>, f64)> {
+/// Views that lie above the others, among so many that were measured, and the chance of it.
+pub struct Above {
+    pub views: Vec<Structure>,
+    pub of: usize,
+    pub p: f64,
+}
+
+/// Those of the views whose `value`, which is none on average where there is nothing, lies above the others'.
+pub fn some_views(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Above> {
     let measured = |s: &Structure| Some((value(s).filter(|v| v.is_finite())?, s.pixels));
     let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
     let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
     let weight = Weight::of(&values);
-    let off = values.iter().map(|(x, size)| weight.at(*size).sqrt() * (x - expected));
-    let some = SomeViews::above(&off.collect::<Vec<_>>())?;
-    Some((some.which.iter().map(|&v| which[v].clone()).collect(), some.p))
+    let off = values.iter().map(|(x, size)| weight.at(*size).sqrt() * x);
+    let SomeViews { which: these, p } = SomeViews::above(&off.collect::<Vec<_>>())?;
+    let views = these.into_iter().map(|v| which[v].clone()).collect();
+    Some(Above { views, of: which.len(), p })
 }
 
 /// Chance that the k-th of `above` half normal values lies this far out, in units of the root mean square of `below`

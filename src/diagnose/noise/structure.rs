@@ -35,6 +35,8 @@ pub struct Structure {
     pub lagged: [Option<f64>; 3],
     /// Logarithm of each of the first frames' variance over that of the others.
     pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
+    /// Pixels that all of these frames measured.
+    pub frame_pixels: f64,
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
     /// The same of means over a few pixels, px^2.
@@ -133,7 +135,7 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
         s.lagged[lag - 1] = mean(pairs);
     }
-    s.frame_log_variance = frame_log_variance(&frames);
+    (s.frame_log_variance, s.frame_pixels) = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();
     let pairs: Option<Vec<Pairs>> =
         changes(&images).iter().map(|change| Pairs::of(change, field.width)).collect();
@@ -150,20 +152,23 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     s.window_px = Some(window.sqrt());
     let of_mean_px2 = frame_mean_px2(field, &s, window);
     s.jitter = Jitter::of(field, of_mean_px2);
-    s.tilts = TiltScatter::of(field, of_mean_px2);
+    let columns = (s.pixels / rows(field)).max(1.0);
+    let of_columns_px2 = s.column_px2.unwrap_or(0.0).max(0.0) / columns;
+    s.tilts = TiltScatter::of(field, of_mean_px2 + of_columns_px2);
     s
 }
 
 /// What the pixels' own noise, and the rows', makes a frame's mean err by, px^2.
 fn frame_mean_px2(field: &Field, s: &Structure, correlation_sum: f64) -> f64 {
     let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);
-    let rows = field
-        .pixels
-        .last()
-        .zip(field.pixels.first())
-        .map_or(1.0, |(last, first)| f64::from(last - first) / field.width as f64 + 1.0);
     let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
-    own + s.row_px2.unwrap_or(0.0).max(0.0) / rows
+    own + s.row_px2.unwrap_or(0.0).max(0.0) / rows(field)
+}
+
+/// Rows from the target's first to its last.
+fn rows(field: &Field) -> f64 {
+    let ends = field.pixels.last().zip(field.pixels.first());
+    ends.map_or(1.0, |(last, first)| f64::from(last - first) / field.width as f64 + 1.0)
 }
 
 /// What is left of the `power` without what rows and columns share, px^2.

@@ -68,7 +68,7 @@ pub fn tails(
     let of_some = comparable.then(of_some).flatten();
     if let Some(TailedViews { views: some, p }) = of_some.filter(|t| 2.0 * t.p <= level) {
         let found = far_out(&some, parameters, own, p, confusers)?;
-        return Some(found.of_some(some.len(), views.len(), 2.0 * p));
+        return Some(found.of_some([some.len(), views.len()], 2.0 * p));
     }
     let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
     if looked { weak(views, level, parameters) } else { None }

@@ -198,12 +198,12 @@ fn products(a: &[f32], b: &[f32]) -> f64 {
 
 /// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
 /// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
-/// of which none can be blamed.
-pub fn frame_log_variance(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
-    let mut all = [None; FRAMES_KEPT];
+/// of which none can be blamed. And how many pixels all of them measured, which are those looked at.
+pub fn frame_log_variance(frames: &[Vec<f32>]) -> ([Option<f64>; FRAMES_KEPT], f64) {
+    let (mut all, mut pixels) = ([None; FRAMES_KEPT], 0.0);
     let n = frames.len().min(FRAMES_KEPT);
     if n < 3 {
-        return all;
+        return (all, pixels);
     }
     let mut squares = [0.0; FRAMES_KEPT];
     for k in 0..frames[0].len() {
@@ -211,6 +211,7 @@ pub fn frame_log_variance(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
             std::array::from_fn(|j| frames.get(j).map_or(0.0, |f| f64::from(f[k]).powi(2)));
         if at.iter().sum::<f64>().is_finite() {
             squares.iter_mut().zip(at).for_each(|(square, r)| *square += r);
+            pixels += 1.0;
         }
     }
     let whole: f64 = squares.iter().sum();
@@ -218,7 +219,7 @@ pub fn frame_log_variance(frames: &[Vec<f32>]) -> [Option<f64>; FRAMES_KEPT] {
         let rest = (whole - own) / (n - 1) as f64;
         *one = (own > 0.0 && rest > 0.0).then(|| (own / rest).ln());
     }
-    all
+    (all, pixels)
 }
 
 #[cfg(test)]

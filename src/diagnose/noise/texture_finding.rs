@@ -26,13 +26,12 @@ pub struct TextureFinding {
 }
 
 impl TextureFinding {
-    /// What these of the views showed when they were taken for all, of so many.
-    pub fn of_some(self, shown: usize, views: usize, p: f64) -> Self {
-        let which = format!("in {shown} of {views} views");
+    /// What these views showed when they were taken for all, of so many that were measured.
+    pub fn of_some(self, [shown, of]: [usize; 2], p: f64) -> Self {
+        let which = format!("in {shown} of {of} views");
         let words = Some(self.words.map_or(which.clone(), |words| format!("{words}, {which}")));
         TextureFinding { words, of_some: true, p, ..self }
     }
-
     /// With these names, and nothing else said yet.
     pub fn named(families: Vec<&'static str>, statistic: Statistic, axis: Axis) -> Self {
         TextureFinding {

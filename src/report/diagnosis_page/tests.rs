@@ -33,6 +33,7 @@ fn finding(status: Status, effect: Option<&'static str>) -> Finding {
         replicated: Some(true),
         physics: String::new(),
         next_view: None,
+        of_some: false,
         contradicted: None,
         shape: None,
         curve: None,
