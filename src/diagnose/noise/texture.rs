@@ -57,16 +57,19 @@ pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
 /// Residuals as an image, px, without what is known, gross errors, and all that does not change from
 /// pixel to pixel.
 pub fn pixel_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
-    let [pixels, _] = at_two_scales(field, residuals, bias);
-    pixels
+    high_pass(&fine_scale(field, residuals, bias), field.width, PIXEL_BOX)
 }
 
 /// The same, and beside it what does not change from pixel to pixel but is not smooth: its means over as many.
 pub fn at_two_scales(field: &Field, residuals: &[f32], bias: &[f32]) -> [Vec<f32>; 2] {
-    let image = without_outliers(&high_passed(field, residuals, bias));
+    let image = fine_scale(field, residuals, bias);
     let pixels = high_pass(&image, field.width, PIXEL_BOX);
     let means = image.iter().zip(&pixels).map(|(all, own)| all - own).collect();
     [pixels, means]
+}
+
+fn fine_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+    without_outliers(&high_passed(field, residuals, bias))
 }
 
 /// Without gross errors.
