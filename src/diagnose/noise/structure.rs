@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::frame_series::{Jitter, TiltScatter};
 use super::moments::Moments;
-use super::pairs::Pairs;
+use super::pairs::{Pairs, REACH_PX};
 use super::still::{KeptPattern, beside_bias, still};
 use super::tail_counts::{FEWEST_READINGS, TailCounts};
 use super::texture::{
@@ -150,7 +150,10 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     let shares = [share(s.row_px2), share(s.column_px2)];
     let window = area(&moving(&frames, s.lagged[0]), field.width, shares);
     s.window_px = Some(window.sqrt());
-    let of_mean_px2 = frame_mean_px2(field, &s, window);
+    // A part of the noise that comes through a window is too little to see lag by lag.
+    let box_px = (2.0 * REACH_PX as f64 + 1.0).powi(2);
+    let near = 1.0 + (box_px - 1.0) * s.neighbour_correlation.unwrap_or(0.0);
+    let of_mean_px2 = frame_mean_px2(field, &s, window.max(near));
     s.jitter = Jitter::of(field, of_mean_px2);
     let columns = (s.pixels / rows(field)).max(1.0);
     let of_columns_px2 = s.column_px2.unwrap_or(0.0).max(0.0) / columns;
