@@ -1,10 +1,13 @@
 //! Heavy tails that some of the views have and the others have not: of those a mean over all tells little.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use statrs::distribution::{Binomial, DiscreteCDF, Poisson};
+use statrs::function::erf::erfc;
 
 use super::some_views::fewest;
 use super::structure::Structure;
-use super::tail_counts::FEWEST_READINGS;
+use super::tail_counts::{FEWEST_READINGS, TAIL_EDGES};
 
 /// A view has tails where as many are this improbable.
 const CLEAR: f64 = 1e-3;
@@ -26,7 +29,8 @@ pub fn tailed_views(
 ) -> Option<TailedViews> {
     let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > FEWEST_READINGS).collect();
     let tailed = |s: &&&Structure| {
-        s.tails.share() > heavy && chance(s, readings(s), expected).is_some_and(|p| p < CLEAR)
+        s.tails.share() > heavy * bent(s)
+            && chance(s, readings(s), expected).is_some_and(|p| p < CLEAR)
     };
     let tailed: Vec<Structure> = looked.iter().filter(tailed).map(|s| (*s).clone()).collect();
     if tailed.len() < fewest(looked.len()) {
@@ -35,9 +39,22 @@ pub fn tailed_views(
     Some(TailedViews { views: tailed, p: order_statistic(&looked, readings, expected)? })
 }
 
+/// How many times its share a Gaussian of the depth has beyond four sigma of the disparity: of noise x of s times the
+/// disparity that becomes x / (1 - s x).
+fn bent(view: &Structure) -> f64 {
+    let beyond = |x: f64| erfc(x * FRAC_1_SQRT_2);
+    // Noise of a quarter of the disparity has no disparity four sigma out.
+    let s = TAIL_SIGMAS * view.relative_sigma.min(MAX_RELATIVE);
+    (beyond(TAIL_SIGMAS / (1.0 + s)) + beyond(TAIL_SIGMAS / (1.0 - s)))
+        / (2.0 * beyond(TAIL_SIGMAS))
+}
+
+const TAIL_SIGMAS: f64 = TAIL_EDGES[0];
+const MAX_RELATIVE: f64 = 0.2;
+
 /// That a view has so many places with far readings or more; of those that hang together one counts.
 fn chance(view: &Structure, readings: f64, expected: f64) -> Option<f64> {
-    let poisson = Poisson::new(expected * readings).ok()?;
+    let poisson = Poisson::new(expected * bent(view) * readings).ok()?;
     Some((view.far_places as u64).checked_sub(1).map_or(1.0, |fewer| poisson.sf(fewer)))
 }
 
@@ -103,6 +120,22 @@ mod tests {
         let seen = (0..4000).filter(|_| chance() < 0.01).count();
         // Binomial: 40, give or take 6.3; that counts are whole numbers makes it fewer.
         assert!((5..60).contains(&seen), "{seen}");
+    }
+
+    /// A million Gaussian depths of relative noise 3 %: their disparities beyond four sigma, to the root of their number.
+    #[test]
+    fn what_is_gaussian_in_the_depth_has_its_share_in_the_disparity() {
+        const S: f64 = 0.03;
+        let mut rng = Seed(6).stream("tails-of-some/bent");
+        let mut far = || {
+            let x: f64 = rand_distr::StandardNormal.sample(&mut rng);
+            (x / (1.0 - S * x)).abs() > 4.0
+        };
+        let n = (0..1_000_000).filter(|_| far()).count() as f64;
+        let view = Structure { relative_sigma: S, ..Structure::default() };
+        let expected = 1e6 * GAUSSIAN_TAIL * bent(&view);
+        assert!((n - expected).abs() < 4.0 * expected.sqrt(), "{n} of {expected}");
+        assert!((bent(&Structure::default()) - 1.0).abs() < 1e-12);
     }
 
     /// A speck of nine pixels in four frames is one place.
