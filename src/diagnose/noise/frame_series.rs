@@ -117,7 +117,7 @@ fn axes(field: &Field) -> Option<Vec<[f64; 2]>> {
             all.iter_mut().for_each(|p| p[1] -= shared * p[0]);
         }
         let spread = (all.iter().map(|p| p[axis].powi(2)).sum::<f64>() / n).sqrt();
-        if !(spread > 0.0) {
+        if !spread.is_normal() {
             return None;
         }
         all.iter_mut().for_each(|p| p[axis] /= spread);
