@@ -18,7 +18,6 @@ use super::finding::scene::Scene;
 use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
 use super::noise::scatter::ScatterResult;
-use super::noise::tails::EXCESS;
 use super::noise::texture_finding::TextureFinding;
 use super::options::Ablation;
 use super::search::bias;
@@ -171,10 +170,9 @@ impl Case<'_> {
             excess > 1.0
                 && f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
         };
-        let far_errors = |t: &TextureFinding| !t.parameters.contains_key(EXCESS) && !t.of_some;
         let of_all = |t: &TextureFinding| !t.of_some && t.statistic != Statistic::Distribution;
         let textures = scatter.textures.iter().any(of_all) || scatter.tails.is_some();
-        let textured = scatter.tails.as_ref().is_some_and(far_errors)
+        let textured = scatter.tails.as_ref().is_some_and(TextureFinding::are_far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
         !stepped && !tailed && !of_rows

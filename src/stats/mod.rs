@@ -18,6 +18,7 @@ use std::f64::consts::PI;
 
 use statrs::distribution::{Beta, ContinuousCDF, Normal, StudentsT};
 use statrs::function::beta::checked_beta_reg;
+use statrs::function::erf::erfc;
 
 /// The median absolute deviation of a Gaussian times this is its standard deviation:
 /// 1/Phi^-1(3/4), Phi the standard normal distribution.
@@ -134,6 +135,11 @@ pub fn clopper_pearson(k: usize, n: usize, level: f64) -> [f64; 2] {
     let low = if k > 0.0 { quantile(k, n - k + 1.0, tail) } else { 0.0 };
     let high = if k < n { quantile(k + 1.0, n - k, 1.0 - tail) } else { 1.0 };
     [low, high]
+}
+
+/// P(|X| > t) of a standard normal.
+pub fn normal_beyond(t: f64) -> f64 {
+    erfc(t * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// P(X <= k) of a binomial with `n` trials and rate `p`.

@@ -10,7 +10,6 @@ use crate::diagnose::noise::mixture::Mixture;
 use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
-use crate::diagnose::noise::tails::EXCESS;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::views::field::Field;
@@ -82,7 +81,7 @@ fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfV
         }
         // Beside what stands still, which the finding is told without.
         (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
-        (Some("heavy-tails"), ..) if found.parameters.contains_key(EXCESS) => {
+        (Some("heavy-tails"), ..) if found.are_weak_tails() => {
             Box::new(|s| s.excess()?.into_iter().min_by(f64::total_cmp))
         }
         (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),

@@ -85,14 +85,16 @@ pub(in crate::diagnose) fn measure_tails(
             told && field.edge.get(k).is_none_or(|edge| *edge >= rim)
         };
         let told: Vec<bool> = (0..field.pixels.len()).map(is_told).collect();
+        let factor = |k: usize| factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
+        let sigma_px: Vec<f32> = (0..told.len()).map(|k| field.sigma[k] * factor(k)).collect();
+        let disparity = |k| field.disparity(k, &bench.rays) as f32;
         // Single frames, unless what stands still in them could be taken for a tail.
         let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
         let looks = |of: &(dyn Fn(usize, f32) -> f32 + Sync)| {
             let whitened = |frame: &Vec<f32>| {
                 let white = |k: usize| {
-                    let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
                     let error = frame[k] - bias.get(n).map_or(0.0, |b| b[k]);
-                    if told[k] { of(k, error) / (field.sigma[k] * factor) } else { f32::NAN }
+                    if told[k] { of(k, error) / sigma_px[k] } else { f32::NAN }
                 };
                 field.high_passed(&(0..frame.len()).map(white).collect::<Vec<f32>>())
             };
@@ -109,15 +111,11 @@ pub(in crate::diagnose) fn measure_tails(
         let mut far = vec![false; in_disparity.first().map_or(0, Vec::len)];
         in_disparity.iter().for_each(|look| s.tails.add(&tail(look, field.width, &mut far)));
         s.far_places = places(far, field.width);
-        let disparity = |k| field.disparity(k, &bench.rays) as f32;
         let bends = (0..field.pixels.len()).any(|k| field.sigma[k] > BENDS * disparity(k));
         // An error of the depth is that of the disparity, e, over 1 + e / d.
         let in_depth = |k: usize, error: f32| error / (1.0 + error / disparity(k));
         s.moments = vec![moments(&in_disparity)];
-        let relative = (0..field.pixels.len()).map(|k| {
-            let factor = factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
-            f64::from(field.sigma[k] * factor / disparity(k))
-        });
+        let relative = sigma_px.iter().enumerate().map(|(k, s)| f64::from(s / disparity(k)));
         s.relative_sigma = mean(relative.filter(|s| s.is_finite())).unwrap_or(0.0);
         s.moments.extend(bends.then(|| moments(&looks(&in_depth))));
     });

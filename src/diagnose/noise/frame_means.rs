@@ -1,8 +1,8 @@
 //! Frames whose means move or jitter as the pixels' noise does not explain.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::frame_series::Jitter;
+use super::frame_series::{Excess, Jitter};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
@@ -12,9 +12,6 @@ use crate::terms::{Axis, Statistic};
 
 /// Motion that is not uniform, and jitter that is no white noise, differ by this share.
 const UNEVEN: f64 = 0.2;
-
-/// The frames' means scatter by this factor more before it is called jitter.
-const JITTER: f64 = 2.0;
 
 /// Frames that shift as a whole.
 const JITTERS: &str = "frame-jitter";
@@ -120,8 +117,8 @@ pub(in crate::diagnose) fn frame_means(
     // A motion that is not uniform scatters about its line.
     let trend_px2 = all.iter().map(|j| j.trend_px2).sum::<f64>() / all.len() as f64;
     if found.is_empty() || noise.extra_px2 >= 0.15 * trend_px2 {
-        let known_px = jitter_px2(&[], known).sqrt();
-        found.extend(jitter(&all, &noise, known_px, variance_px2(views), level));
+        let known_px2 = jitter_px2(&[], known);
+        found.extend(jitter(&all, &noise, known_px2, variance_px2(views), level));
     }
     found
 }
@@ -170,21 +167,17 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
 fn jitter(
     all: &[Jitter],
     noise: &FrameNoise,
-    known_px: f64,
+    known_px2: f64,
     variance_px2: f64,
     level: f64,
 ) -> Option<TextureFinding> {
-    let ratio: f64 = all
-        .iter()
-        .map(|j| j.scatter_px2 / (j.expected_px2 + known_px * known_px).max(1e-300))
-        .sum();
-    let p = ChiSquared::new(noise.freedom).map_or(1.0, |d| d.sf(ratio / JITTER));
+    let beside = |j: &Jitter| j.scatter_px2 / (j.expected_px2 + known_px2).max(1e-300);
+    let Excess { p, nats } = Excess::of(all.iter().map(beside).sum(), noise.freedom);
     let jitter_px2 = noise.extra_px2;
     if !(p < level && jitter_px2 > 0.0) {
         return None;
     }
     let sigma = jitter_px2.sqrt();
-    let larger = ratio / noise.freedom;
     Some(TextureFinding {
         parameters: one(
             "sigma_px",
@@ -192,8 +185,8 @@ fn jitter(
             sigma * UNEVEN.hypot(1.0 / (2.0 * noise.freedom).sqrt()),
         ),
         size_sigma: (jitter_px2 / variance_px2.max(1e-12)).sqrt(),
-        p: p.max(1e-300),
-        nats: 0.5 * noise.freedom * (larger - 1.0 - larger.ln()),
+        p,
+        nats,
         ..TextureFinding::named(vec![JITTERS], Statistic::Correlation, Axis::Frame)
     })
 }

@@ -1,6 +1,29 @@
 //! What a view's frames measure one after the other, as a line in time and the scatter about it.
 
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
 use crate::diagnose::views::field::{CLIP_SIGMAS, Field};
+
+/// Frames scatter by this factor more before it is told: what pixels share beyond a window's reach is not in their
+/// noise, and heavy tails double what the size of it scatters by.
+const MUCH: f64 = 2.0;
+
+/// Squares that scatter by more than their noise, as so many times what is expected of their degrees of freedom.
+pub struct Excess {
+    /// Chance of it for noise twice as large as is known.
+    pub p: f64,
+    pub nats: f64,
+}
+
+impl Excess {
+    pub fn of(ratio: f64, freedom: f64) -> Self {
+        let larger = ratio / freedom;
+        Excess {
+            p: ChiSquared::new(freedom).map_or(1.0, |d| d.sf(ratio / MUCH)).max(1e-300),
+            nats: 0.5 * freedom * (larger - 1.0 - larger.ln()),
+        }
+    }
+}
 
 /// A line through values in time.
 pub struct AboutLine {
@@ -74,8 +97,9 @@ pub struct TiltScatter {
 }
 
 impl TiltScatter {
-    /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three, of which
-    /// those that lost most pixels are none. Where the noise is larger far from the middle, as on a tilted target, slopes err by more.
+    /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three, of
+    /// which those that lost many pixels are none. Where the noise is larger far from the middle, as on a tilted
+    /// target, slopes err by more.
     pub fn of(field: &Field, mean_px2: f64) -> Option<Self> {
         let axes = axes(field)?;
         let slopes = field.first.iter().map(|r| slopes(field, r, &axes));
@@ -128,7 +152,8 @@ fn axes(field: &Field) -> Option<Vec<[f64; 2]>> {
 /// A frame with a smaller share of the pixels that others have errs by more than they do.
 const MIN_SHARE: f64 = 0.8;
 
-/// How many pixels of a frame are looked at, and the slopes of their residuals, px at one standard deviation from the middle.
+/// How many pixels of a frame are looked at, and the slopes of their residuals, px at one standard deviation from
+/// the middle.
 fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> (f64, [f64; 2]) {
     let (mut n, mut sum, mut of_axes, mut places) = (0.0, 0.0, [0.0; 2], [0.0; 2]);
     for ((&e, at), sigma) in residuals.iter().zip(axes).zip(&field.sigma) {

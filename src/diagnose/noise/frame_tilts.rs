@@ -1,17 +1,11 @@
 //! Frames whose slope over the picture changes as the pixels' noise does not explain.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-use super::frame_series::TiltScatter;
+use super::frame_series::{Excess, TiltScatter};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
 use crate::diagnose::finding::parameters::one;
 use crate::terms::{Axis, Statistic};
-
-/// The frames' slopes scatter by this factor more before it is told, as their means before they jitter: what pixels
-/// share beyond a window's reach is not in their noise.
-const MUCH: f64 = 2.0;
 
 /// Slopes that scatter as neither noise nor what moves the frames' means by `jitter_px2` explains.
 pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<TextureFinding> {
@@ -19,19 +13,18 @@ pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<T
     let freedom: f64 = all.iter().map(|t| t.freedom).sum();
     let expected = |t: &TiltScatter| t.expected_px2 + jitter_px2;
     let ratio: f64 = all.iter().map(|t| t.sum_px2 / expected(t)).sum();
-    let p = ChiSquared::new(freedom).ok()?.sf(ratio / MUCH);
+    let Excess { p, nats } = Excess::of(ratio, freedom);
     let beyond = |t: &TiltScatter| t.sum_px2 - t.freedom * expected(t);
     let beyond_px2 = all.iter().map(beyond).sum::<f64>() / freedom;
     if !(p < level && beyond_px2 > 0.0) {
         return None;
     }
     let sigma = beyond_px2.sqrt();
-    let larger = ratio / freedom;
     Some(TextureFinding {
         parameters: one("sigma_px", sigma, sigma / (2.0 * freedom).sqrt()),
         size_sigma: sigma / variance_px2(views).max(1e-12).sqrt(),
-        p: p.max(1e-300),
-        nats: 0.5 * freedom * (larger - 1.0 - larger.ln()),
+        p,
+        nats,
         words: Some("the slope over the picture changes from frame to frame".into()),
         ..TextureFinding::named(vec![], Statistic::Correlation, Axis::Frame)
     })

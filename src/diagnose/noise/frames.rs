@@ -2,8 +2,8 @@
 //! now this one and now that, as under a lamp that flickers.
 
 use serde_json::json;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::frame_series::Excess;
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats};
@@ -38,9 +38,6 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
     })
 }
 
-/// Frames' log variances scatter by this factor more before it is told: heavy tails alone may double it.
-const MUCH: f64 = 2.0;
-
 /// Frames that are now noisier and now quieter than chance has it, by what their logarithms scatter.
 pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
     let (mut ratio, mut freedom, mut beyond) = (0.0, 0.0, 0.0);
@@ -56,12 +53,11 @@ pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
             beyond += squares - (n - 1.0) * expected;
         }
     }
-    let p = ChiSquared::new(freedom).ok()?.sf(ratio / MUCH);
+    let Excess { p, nats } = Excess::of(ratio, freedom);
     if !(p < level && beyond > 0.0) {
         return None;
     }
     let log_variance = (beyond / freedom).sqrt();
-    let larger = ratio / freedom;
     Some(TextureFinding {
         parameters: one(
             "spread_of_log_variance",
@@ -69,8 +65,8 @@ pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
             log_variance / (2.0 * freedom).sqrt(),
         ),
         size_sigma: (0.5 * log_variance).exp() - 1.0,
-        p: p.max(1e-300),
-        nats: 0.5 * freedom * (larger - 1.0 - larger.ln()),
+        p,
+        nats,
         words: Some(
             "now one and now another frame of a view has more noise than the others".into(),
         ),

@@ -1,9 +1,7 @@
 //! The model's heavy tails: a mixture of two Gaussians.
 
-use statrs::function::erf::erfc;
-
 use crate::diagnose::views::known::KnownTerms;
-use crate::stats::{MAD_TO_SIGMA, bisect};
+use crate::stats::{MAD_TO_SIGMA, bisect, normal_beyond};
 
 /// Noise of which a share is drawn so many times wider.
 #[derive(Debug, Clone, Copy)]
@@ -23,8 +21,7 @@ impl Mixture {
 
     /// Share of the readings beyond `t` of the narrow part's standard deviations.
     fn beyond(&self, t: f64) -> f64 {
-        let gaussian = |t: f64| erfc(t * std::f64::consts::FRAC_1_SQRT_2);
-        (1.0 - self.fraction) * gaussian(t) + self.fraction * gaussian(t / self.scale)
+        (1.0 - self.fraction) * normal_beyond(t) + self.fraction * normal_beyond(t / self.scale)
     }
 
     /// Standard deviation by the median, over that of the narrow part.

@@ -60,8 +60,12 @@ impl Moments {
                 near().for_each(|i| unit[*i] = scale * f64::from(image[*i]));
                 let mean = near().map(|i| unit[*i]).sum::<f64>() / n;
                 let spread = (1.0 - mean * mean).sqrt();
-                sums.readings += n;
-                sums.thirds += near().map(|i| ((unit[*i] - mean) / spread).powi(3)).sum::<f64>();
+                // Of one value alone there is no skewness.
+                if spread > 0.0 {
+                    let third = |i: &usize| ((unit[*i] - mean) / spread).powi(3);
+                    sums.readings += n;
+                    sums.thirds += near().map(third).sum::<f64>();
+                }
                 // Both of a pair have the scale of this patch.
                 sums.add_pairs(&unit, width, &patch.pixels);
                 near().for_each(|i| unit[*i] = f64::NAN);

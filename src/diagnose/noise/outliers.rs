@@ -6,10 +6,9 @@
 //! places win more often than far ones, by a Laplace distribution; where all in its window are alike,
 //! by a uniform one. The posterior is summed over the three.
 
-use statrs::function::erf::erfc;
-
 use super::tail_counts::{TAIL_EDGES, TailCounts};
 use crate::diagnose::search::posterior::Posterior;
+use crate::stats::normal_beyond;
 
 /// Share and scale of the far errors, each with its standard error; the scale is their standard
 /// deviation over that of the noise.
@@ -21,7 +20,7 @@ pub struct Outliers {
 
 /// Share of unit errors farther out than `t` standard deviations.
 const FORMS: [fn(f64) -> f64; 3] = [
-    |t| erfc(t * std::f64::consts::FRAC_1_SQRT_2),
+    normal_beyond,
     |t| (-std::f64::consts::SQRT_2 * t).exp(),
     |t| (1.0 - t / 3f64.sqrt()).max(0.0),
 ];

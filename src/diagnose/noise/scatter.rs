@@ -4,7 +4,7 @@ use super::lines::LearntLines;
 use super::skewness::skewness;
 use super::still::beside_bias;
 use super::structure::{Structure, structures};
-use super::tails::{Confusers, EXCESS, tails};
+use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
 use super::{ROW_NOISE, further_textures, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
@@ -86,21 +86,19 @@ impl Case<'_> {
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
         // Far errors to one side alone make both; what is skewed has a fourth moment.
-        let is_far = |t: &TextureFinding| !t.parameters.contains_key(EXCESS) && !t.of_some;
-        let may_be = self.baseline.is_none() && !tails.as_ref().is_some_and(is_far);
+        let far = tails.as_ref().is_some_and(TextureFinding::are_far_errors);
+        let may_be = self.baseline.is_none() && !far;
         let skewed = may_be.then(|| skewness(&structure, each)).flatten();
         let skewed = skewed.filter(|t| self.stands(t.p, each));
-        let tails = tails.filter(|t| skewed.is_none() || !t.parameters.contains_key(EXCESS));
+        let tails = tails.filter(|t| skewed.is_none() || !t.are_weak_tails());
         textures.extend(skewed);
         ScatterResult { structure, textures, tails, outcome }
     }
 
     /// Lines that stand still are part of the mean: beside them the noise has its own size and tails.
     fn learn_lines(&mut self, mean: &mut MeanResult, textures: &[TextureFinding]) {
-        let still =
-            textures.iter().filter(|t| t.families.is_empty() && t.statistic == Statistic::Bias);
-        let axes: Vec<Axis> =
-            still.map(|t| t.axis).filter(|a| matches!(a, Axis::Column | Axis::Row)).collect();
+        let still = textures.iter().filter(|t| t.are_still_lines());
+        let axes: Vec<Axis> = still.map(|t| t.axis).collect();
         if axes.is_empty() || self.baseline.is_some() {
             return;
         }

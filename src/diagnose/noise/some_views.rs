@@ -1,11 +1,10 @@
 //! Statistics that some of the views have and the others have not: of those a mean over all tells little.
 
-use statrs::distribution::{
-    Binomial, Chi, Continuous, ContinuousCDF, DiscreteCDF, Normal, StudentsT,
-};
+use statrs::distribution::{Chi, Continuous, ContinuousCDF, StudentsT};
 
 use super::structure::Structure;
 use super::view_mean::Weight;
+use crate::stats::{at_least, normal_beyond};
 
 /// Fewer views than this, and than this share of all, are odd ones.
 const FEWEST: usize = 3;
@@ -74,14 +73,13 @@ pub fn some_views(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>
 /// others: summed over what that may be.
 fn order_statistic(far: f64, k: usize, above: usize, below: usize) -> f64 {
     const STEPS: usize = 400;
-    let (Ok(chi), Ok(normal)) = (Chi::new(below as u64), Normal::new(0.0, 1.0)) else { return 1.0 };
+    let Ok(chi) = Chi::new(below as u64) else { return 1.0 };
     // Nothing is left of the distribution beyond.
     let end = (below as f64).sqrt() + 6.0;
     let at = |step: usize| {
         let chi_value = end * (step as f64 + 0.5) / STEPS as f64;
-        let one = 2.0 * normal.sf(far * chi_value / (below as f64).sqrt());
-        let all = Binomial::new(one.clamp(0.0, 1.0), above as u64);
-        all.map_or(1.0, |all| all.sf(k as u64 - 1)) * chi.pdf(chi_value)
+        let one = normal_beyond(far * chi_value / (below as f64).sqrt());
+        at_least(k, above, one) * chi.pdf(chi_value)
     };
     ((0..STEPS).map(at).sum::<f64>() * end / STEPS as f64).clamp(1e-300, 1.0)
 }

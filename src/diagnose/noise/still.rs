@@ -59,21 +59,18 @@ fn covariances(
     views: &[(&Field, &[f32])],
     images: impl Fn(&Field, &[f32]) -> [Vec<f32>; 2] + Sync,
 ) -> Vec<Still> {
-    let all = views.par_iter().map(|(f, b)| {
-        let [pixels, blotches] = images(f, b);
-        let (columns, rows) = sharp_lines(&pixels, f.width);
-        [pixels, blotches]
-            .map(|m| without_lines(&m, f.width, SHORT_LINE))
-            .into_iter()
-            .chain([columns, rows])
-    });
-    let mut all: Vec<_> = all.collect();
-    let mut next = |fewest| {
-        let images: Vec<Vec<f32>> = all.iter_mut().filter_map(Iterator::next).collect();
-        across_views(&images, fewest)
+    let of_view = |(f, b): &(&Field, &[f32])| {
+        let images = images(f, b);
+        let (columns, rows) = sharp_lines(&images[0], f.width);
+        let [pixels, blotches] = images.map(|m| without_lines(&m, f.width, SHORT_LINE));
+        [pixels, blotches, columns, rows]
     };
-    let [pixels, blotches] = [(); 2].map(|()| next(FEWEST_PAIRS[0]));
-    let [columns, rows] = [(); 2].map(|()| next(FEWEST_PAIRS[1]));
+    let all: Vec<[Vec<f32>; 4]> = views.par_iter().map(of_view).collect();
+    let of = |k: usize, fewest| {
+        across_views(&all.iter().map(|view| &view[k][..]).collect::<Vec<_>>(), fewest)
+    };
+    let [pixels, blotches] = [0, 1].map(|k| of(k, FEWEST_PAIRS[0]));
+    let [columns, rows] = [2, 3].map(|k| of(k, FEWEST_PAIRS[1]));
     let still = |v: usize| Still {
         fixed_px2: pixels[v],
         blotches_px2: blotches[v],
@@ -117,21 +114,21 @@ fn tossed(field: &Field, coins: &[f32]) -> Vec<f32> {
 }
 
 /// Mean product of each view's values with the mean of the others', px^2.
-fn across_views(means: &[Vec<f32>], fewest: f64) -> Vec<Option<f64>> {
-    let n = means.iter().map(Vec::len).max().unwrap_or(0);
+fn across_views(means: &[&[f32]], fewest: f64) -> Vec<Option<f64>> {
+    let n = means.iter().map(|image| image.len()).max().unwrap_or(0);
     let mut sum = vec![0f32; n];
     let mut count = vec![0u16; n];
     for image in means {
-        for ((s, c), &r) in sum.iter_mut().zip(&mut count).zip(image) {
+        for ((s, c), &r) in sum.iter_mut().zip(&mut count).zip(*image) {
             if r.is_finite() {
                 *s += r;
                 *c += 1;
             }
         }
     }
-    let of = |image: &Vec<f32>| {
+    let of = |image: &&[f32]| {
         let (mut products, mut n) = (0.0, 0.0);
-        for ((&s, &c), &r) in sum.iter().zip(&count).zip(image) {
+        for ((&s, &c), &r) in sum.iter().zip(&count).zip(*image) {
             if r.is_finite() && c > 1 {
                 // Pixels that many views saw say more.
                 let others = f64::from(c - 1);

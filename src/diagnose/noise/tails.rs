@@ -7,7 +7,7 @@ use super::outliers::{Outliers, outliers};
 use super::structure::Structure;
 use super::tail_counts::{GAUSSIAN_TAIL, TAIL_EDGES, TailCounts};
 use super::tails_of_some::{TailedViews, tailed_views};
-use super::texture_finding::TextureFinding;
+use super::texture_finding::{EXCESS, TextureFinding};
 use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::estimate;
 use crate::diagnose::views::known::KnownTerms;
@@ -113,8 +113,6 @@ fn independent_readings(view: &Structure) -> f64 {
     view.tails.n / view.repeats()
 }
 
-/// The parameter that tells a finding of [`weak`] from one of far errors.
-pub const EXCESS: &str = "excess_kurtosis";
 /// Share of the readings that weak tails are said to be drawn from: a moment gives one number, and the
 /// catalogue's mixture has two.
 const WEAK_FRACTION: f64 = 0.1;

@@ -1,13 +1,11 @@
 //! Heavy tails that some of the views have and the others have not: of those a mean over all tells little.
 
-use std::f64::consts::FRAC_1_SQRT_2;
-
-use statrs::distribution::{Binomial, DiscreteCDF, Poisson};
-use statrs::function::erf::erfc;
+use statrs::distribution::{DiscreteCDF, Poisson};
 
 use super::some_views::fewest;
 use super::structure::Structure;
 use super::tail_counts::{FEWEST_READINGS, TAIL_EDGES};
+use crate::stats::{at_least, normal_beyond};
 
 /// A view has tails where as many are this improbable.
 const CLEAR: f64 = 1e-3;
@@ -42,14 +40,13 @@ pub fn tailed_views(
 /// How many times its share a Gaussian of the depth has beyond four sigma of the disparity: of noise x of s times the
 /// disparity that becomes x / (1 - s x).
 fn bent(view: &Structure) -> f64 {
-    let beyond = |x: f64| erfc(x * FRAC_1_SQRT_2);
-    // Noise of a quarter of the disparity has no disparity four sigma out.
-    let s = TAIL_SIGMAS * view.relative_sigma.min(MAX_RELATIVE);
-    (beyond(TAIL_SIGMAS / (1.0 + s)) + beyond(TAIL_SIGMAS / (1.0 - s)))
-        / (2.0 * beyond(TAIL_SIGMAS))
+    let far = TAIL_EDGES[0];
+    let s = far * view.relative_sigma.min(MAX_RELATIVE);
+    let sides = normal_beyond(far / (1.0 + s)) + normal_beyond(far / (1.0 - s));
+    sides / (2.0 * normal_beyond(far))
 }
 
-const TAIL_SIGMAS: f64 = TAIL_EDGES[0];
+/// Noise of a quarter of the disparity has no disparity four sigma out.
 const MAX_RELATIVE: f64 = 0.2;
 
 /// That a view has so many places with far readings or more; of those that hang together one counts.
@@ -69,8 +66,7 @@ fn order_statistic(
     chances.sort_by(f64::total_cmp);
     let fewest = fewest(views.len());
     let p = chances.get(fewest - 1)?.clamp(0.0, 1.0);
-    let of_views = Binomial::new(p, chances.len() as u64).ok()?;
-    Some(of_views.sf(fewest as u64 - 1).max(1e-300))
+    Some(at_least(fewest, chances.len(), p).max(1e-300))
 }
 
 #[cfg(test)]

@@ -32,6 +32,22 @@ impl TextureFinding {
         let words = Some(self.words.map_or(which.clone(), |words| format!("{words}, {which}")));
         TextureFinding { words, of_some: true, p, ..self }
     }
+    /// Tails too weak to count, which the fourth moment alone tells.
+    pub fn are_weak_tails(&self) -> bool {
+        self.parameters.contains_key(EXCESS)
+    }
+
+    /// Of tails: do all views have errors far out?
+    pub fn are_far_errors(&self) -> bool {
+        !self.of_some && !self.are_weak_tails()
+    }
+
+    /// Columns or rows that stand still, without a name.
+    pub fn are_still_lines(&self) -> bool {
+        let of_lines = matches!(self.axis, Axis::Column | Axis::Row);
+        self.families.is_empty() && self.statistic == Statistic::Bias && of_lines
+    }
+
     /// With these names, and nothing else said yet.
     pub fn named(families: Vec<&'static str>, statistic: Statistic, axis: Axis) -> Self {
         TextureFinding {
@@ -48,6 +64,9 @@ impl TextureFinding {
         }
     }
 }
+
+/// The parameter that tells tails too weak to count from far errors.
+pub const EXCESS: &str = "excess_kurtosis";
 
 /// Variance that pixels or lines share, as it is looked for.
 pub struct Shared {
