@@ -63,7 +63,7 @@ pub fn tails(
         return far_out(views, parameters, own, share.p_above(own), confusers);
     }
     // The second test of tails at this level.
-    let of_some = || tailed_views(views, independent_readings, expected, heavy);
+    let of_some = || tailed_views(views, expected, heavy);
     let comparable = !confusers.stepped && !confusers.simulated;
     let of_some = comparable.then(of_some).flatten();
     if let Some(TailedViews { views: some, p }) = of_some.filter(|t| 2.0 * t.p <= level) {

@@ -19,22 +19,16 @@ pub struct TailedViews {
 
 /// The views whose share beyond four sigma is above `heavy`, if they are more than odd ones. By the noise alone
 /// a share of up to `expected` is.
-pub fn tailed_views(
-    views: &[Structure],
-    readings: impl Fn(&Structure) -> f64,
-    expected: f64,
-    heavy: f64,
-) -> Option<TailedViews> {
+pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<TailedViews> {
     let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > FEWEST_READINGS).collect();
     let tailed = |s: &&&Structure| {
-        s.tails.share() > heavy * bent(s)
-            && chance(s, readings(s), expected).is_some_and(|p| p < CLEAR)
+        s.tails.share() > heavy * bent(s) && chance(s, expected).is_some_and(|p| p < CLEAR)
     };
     let tailed: Vec<Structure> = looked.iter().filter(tailed).map(|s| (*s).clone()).collect();
     if tailed.len() < fewest(looked.len()) {
         return None;
     }
-    Some(TailedViews { views: tailed, p: order_statistic(&looked, readings, expected)? })
+    Some(TailedViews { views: tailed, p: order_statistic(&looked, expected)? })
 }
 
 /// How many times its share a Gaussian of the depth has beyond four sigma of the disparity: of noise x of s times the
@@ -49,19 +43,16 @@ fn bent(view: &Structure) -> f64 {
 /// Noise of a quarter of the disparity has no disparity four sigma out.
 const MAX_RELATIVE: f64 = 0.2;
 
-/// That a view has so many places with far readings or more; of those that hang together one counts.
-fn chance(view: &Structure, readings: f64, expected: f64) -> Option<f64> {
-    let poisson = Poisson::new(expected * bent(view) * readings).ok()?;
+/// That a view has so many places with far readings or more; of those that hang together one counts. There are no more
+/// places than far readings: through a window of 5 px most places of noise have one or two, not as many as share it.
+fn chance(view: &Structure, expected: f64) -> Option<f64> {
+    let poisson = Poisson::new(expected * bent(view) * view.tails.n).ok()?;
     Some((view.far_places as u64).checked_sub(1).map_or(1.0, |fewer| poisson.sf(fewer)))
 }
 
 /// Chance that the fewest views that count are all as improbable as the last of them.
-fn order_statistic(
-    views: &[&Structure],
-    readings: impl Fn(&Structure) -> f64,
-    expected: f64,
-) -> Option<f64> {
-    let all = views.iter().filter_map(|s| chance(s, readings(s), expected));
+fn order_statistic(views: &[&Structure], expected: f64) -> Option<f64> {
+    let all = views.iter().filter_map(|s| chance(s, expected));
     let mut chances: Vec<f64> = all.collect();
     chances.sort_by(f64::total_cmp);
     let fewest = fewest(views.len());
@@ -74,7 +65,7 @@ mod tests {
     use rand_distr::Distribution;
 
     use super::*;
-    use crate::diagnose::noise::tail_counts::{GAUSSIAN_TAIL, TailCounts};
+    use crate::diagnose::noise::tail_counts::{GAUSSIAN_TAIL, TailCounts, places, tail};
     use crate::rng::{Seed, Stream};
 
     fn session(tailed: usize, share: f64, rng: &mut Stream) -> Vec<Structure> {
@@ -89,7 +80,7 @@ mod tests {
     }
 
     fn p(views: &[Structure]) -> f64 {
-        let all = tailed_views(views, |s| s.tails.n, 1.5 * GAUSSIAN_TAIL, 2.5 * GAUSSIAN_TAIL);
+        let all = tailed_views(views, 1.5 * GAUSSIAN_TAIL, 2.5 * GAUSSIAN_TAIL);
         all.map_or(1.0, |t| t.p)
     }
 
@@ -98,7 +89,7 @@ mod tests {
         let mut rng = Seed(3).stream("tails-of-some");
         for _ in 0..50 {
             let views = session(4, 1e-3, &mut rng);
-            let found = tailed_views(&views, |s| s.tails.n, 1e-4, 1.6e-4).expect("four views");
+            let found = tailed_views(&views, 1e-4, 1.6e-4).expect("four views");
             assert_eq!(found.views.len(), 4);
             assert!(p(&views) < 1e-6 && p(&session(2, 1e-2, &mut rng)) == 1.0);
         }
@@ -111,7 +102,7 @@ mod tests {
         let mut chance = || {
             let expected = 1.5 * GAUSSIAN_TAIL;
             let views = session(16, expected, &mut rng);
-            order_statistic(&views.iter().collect::<Vec<_>>(), |s| s.tails.n, expected).unwrap()
+            order_statistic(&views.iter().collect::<Vec<_>>(), expected).unwrap()
         };
         let seen = (0..4000).filter(|_| chance() < 0.01).count();
         // Binomial: 40, give or take 6.3; that counts are whole numbers makes it fewer.
@@ -132,6 +123,34 @@ mod tests {
         let expected = 1e6 * GAUSSIAN_TAIL * bent(&view);
         assert!((n - expected).abs() < 4.0 * expected.sqrt(), "{n} of {expected}");
         assert!((bent(&Structure::default()) - 1.0).abs() < 1e-12);
+    }
+
+    /// Noise through a window of 5 px is no more often far out than white noise, but in clumps: of 400 views no more than
+    /// one in a hundred is that improbable. With readings counted for one in what shares them, 100 would be.
+    #[test]
+    fn windows_make_no_tails() {
+        const SIZE: [usize; 2] = [160, 120];
+        const SIDE: usize = 5;
+        let mut rng = Seed(8).stream("tails-of-some/windows");
+        let mut view = || {
+            let wide = SIZE[0] + SIDE;
+            let white: Vec<f32> = (0..wide * (SIZE[1] + SIDE))
+                .map(|_| rand_distr::StandardNormal.sample(&mut rng))
+                .collect();
+            let at = |i: usize| {
+                let corner = i / SIZE[0] * wide + i % SIZE[0];
+                (0..SIDE * SIDE).map(|k| white[corner + k / SIDE * wide + k % SIDE]).sum()
+            };
+            let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(at).collect();
+            let mut far = vec![false; image.len()];
+            let tails = tail(&image, SIZE[0], &mut far);
+            let far_places = places(far, SIZE[0]);
+            Structure { tails, far_places, window_px: Some(5.0), ..Default::default() }
+        };
+        let improbable = |_: &u32| chance(&view(), GAUSSIAN_TAIL).unwrap() < 0.01;
+        let found = (0..400).filter(improbable).count();
+        // Binomial: 4, give or take 2.
+        assert!(found <= 12, "{found} of 400");
     }
 
     /// A speck of nine pixels in four frames is one place.
