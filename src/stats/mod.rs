@@ -11,7 +11,7 @@ pub use budget::{
 };
 pub use correlation::{Correlation, measure_correlation};
 pub use paule_mandel::{between, paule_mandel};
-pub use random_effects::RandomEffects;
+pub use random_effects::{RandomEffects, common_value};
 pub use summed_area::SummedArea;
 
 use std::f64::consts::PI;

@@ -28,21 +28,33 @@ impl RandomEffects {
     /// 2007). The common value's interval is Knapp and Hartung's (2003), whose factor is one at Paule
     /// and Mandel's scatter, and is never let below one.
     pub fn of(units: &[(f64, f64)]) -> Option<Self> {
-        let usable = |(y, v): &(f64, f64)| y.is_finite() && v.is_finite() && *v > 0.0;
-        if units.len() < 2 || !units.iter().all(usable) {
-            return None;
-        }
+        let [common, std_error] = common_value(units)?;
         let dof = units.len() as f64 - 1.0;
         let chi_square = ChiSquared::new(dof).ok()?;
-        let scatter2 = |expected: f64| paule_mandel(expected, |tau2| about_mean(units, tau2));
-        let scatter = scatter2(dof).sqrt();
+        let scatter = |expected: f64| scatter2(units, expected).sqrt();
         let tails = [0.5 * (1.0 + LEVEL), 0.5 * (1.0 - LEVEL)];
-        let scatter_interval = tails.map(|p| scatter2(chi_square.inverse_cdf(p)).sqrt());
-        let (common, information) = mean(units, scatter * scatter);
-        let reach = student_quantile(LEVEL, dof) / information.sqrt();
+        let scatter_interval = tails.map(|p| scatter(chi_square.inverse_cdf(p)));
+        let scatter = scatter(dof);
+        let reach = student_quantile(LEVEL, dof) * std_error;
         let common_interval = [common - reach, common + reach];
         Some(RandomEffects { common, common_interval, scatter, scatter_interval })
     }
+}
+
+/// The common value alone, and its standard error, which is one of Student's t of one degree of
+/// freedom less than there are units.
+pub fn common_value(units: &[(f64, f64)]) -> Option<[f64; 2]> {
+    let usable = |(y, v): &(f64, f64)| y.is_finite() && v.is_finite() && *v > 0.0;
+    if units.len() < 2 || !units.iter().all(usable) {
+        return None;
+    }
+    let (common, information) = mean(units, scatter2(units, units.len() as f64 - 1.0));
+    Some([common, information.sqrt().recip()])
+}
+
+/// The variance between units that makes Cochran's Q what is expected.
+fn scatter2(units: &[(f64, f64)], expected: f64) -> f64 {
+    paule_mandel(expected, |tau2| about_mean(units, tau2))
 }
 
 /// The weighted mean, and the sum of the weights.

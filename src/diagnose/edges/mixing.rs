@@ -8,7 +8,7 @@ use crate::diagnose::noise::some_views::SomeViews;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::{ViewMean, nats};
 use crate::diagnose::views::field::Field;
-use crate::stats::{bisect, mean};
+use crate::stats::{bisect, common_value, mean};
 use crate::terms::{Axis, Statistic};
 
 /// Widths of the footprint that decide whether depth mixes, px.
@@ -95,15 +95,14 @@ pub fn mean_share(
     combined(&(0..views.len()).filter_map(of).collect::<Vec<_>>())
 }
 
-/// Mean of (value, information), with the views' scatter where that is larger than the noise's.
+/// Mean of (value, information) with the scatter between views, by which a view that its noise makes sure
+/// of does not decide alone; and how well the mean by the noise explains them.
 fn combined(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
-    let n = views.len() as f64;
+    let units: Vec<(f64, f64)> = views.iter().map(|(v, sure)| (*v, 1.0 / sure)).collect();
+    let [value, std_error] = common_value(&units)?;
     let sure: f64 = views.iter().map(|v| v.1).sum();
-    let value = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure;
-    let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
-    let std_error = (scatter.max(1.0) / sure).sqrt();
-    let explained = value * sure.sqrt();
-    (n > 1.0 && sure > 0.0).then_some((ViewMean { value, std_error, views: n }, explained))
+    let explained = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure.sqrt();
+    Some((ViewMean { value, std_error, views: views.len() as f64 }, explained))
 }
 
 /// A footprint's width, the views' mean share of it and how well it explains them.

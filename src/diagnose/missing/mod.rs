@@ -152,7 +152,13 @@ impl DropoutSearch<'_> {
             if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.share) {
                 break;
             }
-            let p = noise.p(won.gain);
+            let p = noise.p(match seen.expected {
+                Some(_) => ledger.beyond_one_view(won),
+                None => won.gain,
+            });
+            if p > LEVEL / TESTS {
+                break;
+            }
             let told = |won: &Judged| {
                 let rivals = rivals(std::iter::once(won).chain(judged));
                 let finding = self.reporter(seen, ledger.base).finding(won, &rivals, TESTS * p);

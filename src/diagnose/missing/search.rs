@@ -12,6 +12,7 @@ use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::Null;
 use crate::rng::Seed;
+use crate::stats::range;
 use crate::terms::Basis;
 
 /// Precision of a step's size about the whole one: half of it is as likely as one and a half.
@@ -149,17 +150,46 @@ impl<'a> Losses<'a> {
         Column { step, by_view, a }
     }
 
+    /// What it brings without the view that says the most of it. A view and its twin differ by where their
+    /// clumps of losses happen to lie: one in a corner of the steepest view is no law of the tilt.
+    pub fn beyond_one_view(&self, judged: &Judged) -> f64 {
+        let without = |by_view: &[f64]| {
+            let [_, most] = range(by_view.iter().copied());
+            by_view.iter().position(|gain| *gain == most).unwrap_or(0)
+        };
+        match &judged.shape {
+            Shape::Step(step) => {
+                let (mut a, mut b) = self.information(*step);
+                let gains: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b - 0.5 * a).collect();
+                let one = without(&gains);
+                (a[one], b[one]) = (0.0, 0.0);
+                predicted(&a, &b).0 - step.cost()
+            }
+            Shape::Curve(basis) => {
+                let mut evidence = self.evidence(basis);
+                let Some(all) = gain(&evidence, CURVE_PRECISION) else { return 0.0 };
+                evidence.remove(without(&all.by_view));
+                gain(&evidence, CURVE_PRECISION).map_or(0.0, |rest| rest.total)
+            }
+        }
+    }
+
+    /// A step's information and score in every view.
+    fn information(&self, step: Step) -> (Vec<f64>, Vec<f64>) {
+        let column = self.column(step);
+        let solve = |(w, y): (&Whitener, &Vec<f64>)| w.solve(y);
+        let whitened: Vec<Vec<f64>> = self.whiteners.iter().zip(&self.left).map(solve).collect();
+        let scores = column.scores(&whitened);
+        (column.a, scores)
+    }
+
     /// Do both halves of the views lose by this shape?
     pub fn replicate(&self, judged: &Judged, second: &[bool]) -> Option<bool> {
         match &judged.shape {
             Shape::Step(step) => {
-                let column = self.column(*step);
-                let solve = |(w, y): (&Whitener, &Vec<f64>)| w.solve(y);
-                let whitened: Vec<Vec<f64>> =
-                    self.whiteners.iter().zip(&self.left).map(solve).collect();
-                let scores = column.scores(&whitened);
+                let (a, b) = self.information(*step);
                 let half = |which: bool| {
-                    let views = column.a.iter().zip(&scores).zip(second);
+                    let views = a.iter().zip(&b).zip(second);
                     let mine = views.filter(|(_, s)| **s == which);
                     ViewMean::of_scores(mine.map(|((a, b), _)| (*a, *b)))
                 };
