@@ -170,7 +170,8 @@ impl Case<'_> {
             excess > 1.0
                 && f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
         };
-        let of_all = |t: &TextureFinding| !t.of_some && t.statistic != Statistic::Distribution;
+        let of_all =
+            |t: &TextureFinding| t.of_some.is_none() && t.statistic != Statistic::Distribution;
         let textures = scatter.textures.iter().any(of_all) || scatter.tails.is_some();
         let textured = scatter.tails.as_ref().is_some_and(TextureFinding::are_far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);

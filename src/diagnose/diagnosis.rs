@@ -91,9 +91,10 @@ pub struct Finding {
     /// What it looks like over its axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curve: Option<Curve>,
-    /// Only some of the views have it, and no model of the sensor does.
+    /// So many of the views have it, of so many that were measured, and no model of the sensor does; `None`
+    /// of what all have.
     #[serde(skip)]
-    pub of_some: bool,
+    pub of_some: Option<[usize; 2]>,
     /// The effect of the model that the views contradict; such a finding has no name of its own.
     #[serde(skip)]
     pub contradicted: Option<&'static str>,

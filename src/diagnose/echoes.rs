@@ -53,7 +53,7 @@ const SPREADS: [&str; 6] = [
 ];
 
 fn spreads(f: &Finding) -> bool {
-    let named = matches!(f.status, Status::Named | Status::OneOf) && !f.of_some;
+    let named = matches!(f.status, Status::Named | Status::OneOf) && f.of_some.is_none();
     named && (f.statistic == Statistic::Bias || f.effect.is_some_and(|id| SPREADS.contains(&id)))
 }
 

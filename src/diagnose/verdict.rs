@@ -130,7 +130,7 @@ pub(super) fn extend<'a>(
     let fit = 1 + fits.max().unwrap_or(0);
     for f in found {
         let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
-        if !keeps || f.of_some {
+        if !keeps || f.of_some.is_some() {
             continue;
         }
         let id = match (f.status, f.effect) {
@@ -187,7 +187,7 @@ impl Finding {
     /// terms and no name, and what some views have alone have none.
     pub fn is_scored(&self) -> bool {
         match self.statistic {
-            _ if self.of_some => false,
+            _ if self.of_some.is_some() => false,
             Statistic::Bias if self.axis == Axis::Frame => self.effect.is_some(),
             Statistic::Bias | Statistic::Variance => self.curve.is_some() && !self.terms.is_empty(),
             Statistic::Dropout => false,

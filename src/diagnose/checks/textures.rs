@@ -27,7 +27,7 @@ pub fn replicated(
     second: &[bool],
     known: &KnownTerms,
 ) -> Option<bool> {
-    if found.of_some {
+    if found.of_some.is_some() {
         return None;
     }
     let beyond = beyond_known(found, known);
@@ -57,7 +57,7 @@ pub fn gained(
     let mut gains = vec![0.0; aside.len()];
     // What has no name is in no model, and what some views have is no mean of all.
     let named = textures.iter().filter(|t| !t.families.is_empty());
-    for texture in named.chain(tails).filter(|t| !t.of_some) {
+    for texture in named.chain(tails).filter(|t| t.of_some.is_none()) {
         let Some(beyond) = beyond_known(texture, known) else { continue };
         let of = |&v: &usize| {
             let s = &structure[v];

@@ -74,7 +74,7 @@ fn tell_if_held(f: &mut Finding) {
     let nameless = f.status == Status::Unexplained && f.contradicted.is_none();
     if nameless && !f.terms.is_empty() {
         f.physics += " The extended model holds it as the curve that was measured.";
-    } else if nameless || f.of_some {
+    } else if nameless || f.of_some.is_some() {
         f.physics += " The extended model has no term for it.";
     }
 }
@@ -265,8 +265,10 @@ mod tests {
         );
         assert!(told(&|_| ()).ends_with("has no term for it."));
         assert!(!told(&|f| f.contradicted = Some("row-noise")).contains("extended model"));
-        let mut some =
-            Finding { of_some: true, ..named("row-noise", Statistic::Correlation, Axis::Row) };
+        let mut some = Finding {
+            of_some: Some([3, 12]),
+            ..named("row-noise", Statistic::Correlation, Axis::Row)
+        };
         finish(&mut some);
         assert!(some.physics.ends_with("has no term for it."));
     }

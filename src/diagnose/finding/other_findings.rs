@@ -26,7 +26,7 @@ pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding 
         replicated: None,
         physics: physics(Status::Named, Some(effect), statistic, axis, None),
         next_view: None,
-        of_some: false,
+        of_some: None,
         contradicted: None,
         shape: None,
         curve: None,

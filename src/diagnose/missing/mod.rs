@@ -98,9 +98,8 @@ pub fn missing(
         .map(|v| Sides::of(&fields[v].edges, twins.map(|(t, _)| &t[v].edges)))
         .collect();
     if let Some(band) = band(&sides, SHADOW_LEVEL) {
-        let of_all = band.of_some.is_none();
         let mut shadow = shadow_finding(band, fields);
-        shadow.of_some = !of_all;
+        let of_all = shadow.of_some.is_none();
         shadow.replicated = of_all.then(|| bands_agree(&sides, &seen.second)).flatten();
         // Where the target's own mask reaches into its shadow, the same losses are seen again; a
         // region that was given ends at the target.

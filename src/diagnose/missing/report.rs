@@ -243,6 +243,7 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
         size: Size { mm: 0.0, sigma: lost / (asked + lost).max(1.0) },
         p_adjusted: Some(band.p),
         curve: Some(band.curve),
+        of_some: band.of_some,
         ..named(family.unwrap_or_default(), Statistic::Dropout, Axis::EdgeDistance)
     };
     let rivals = [("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])];

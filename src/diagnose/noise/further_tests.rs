@@ -41,7 +41,7 @@ fn told(id: &str, add: impl Fn(&mut Structure)) -> (TextureFinding, usize) {
 fn textures_of_some_views_have_their_names_and_sizes() {
     let rows = |s: &mut Structure| s.row_px2 = s.row_px2.map(|px2| px2 + 0.1 * s.variance_px2);
     let (found, times) = told("row-noise", rows);
-    assert!(times >= 7 && found.of_some, "{times}");
+    assert!(times >= 7 && found.of_some.is_some(), "{times}");
     assert_eq!(found.words.as_deref(), Some("in 5 of 14 views"));
     // A tenth of .04 px^2 by 30^(5/14) to 30^(9/14): .12 to .19 px.
     let [sigma, error] = parameter(&found, "sigma_px");

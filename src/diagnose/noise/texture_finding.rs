@@ -21,8 +21,8 @@ pub struct TextureFinding {
     /// Roughly, nats a recording.
     pub nats: f64,
     pub words: Option<String>,
-    /// Not all views have it, as the words tell.
-    pub of_some: bool,
+    /// So many views have it, of so many, as the words tell; `None` of what all have.
+    pub of_some: Option<[usize; 2]>,
 }
 
 impl TextureFinding {
@@ -30,8 +30,9 @@ impl TextureFinding {
     pub fn of_some(self, [shown, of]: [usize; 2], p: f64) -> Self {
         let which = format!("in {shown} of {of} views");
         let words = Some(self.words.map_or(which.clone(), |words| format!("{words}, {which}")));
-        TextureFinding { words, of_some: true, p, ..self }
+        TextureFinding { words, of_some: Some([shown, of]), p, ..self }
     }
+
     /// Tails too weak to count, which the fourth moment alone tells.
     pub fn are_weak_tails(&self) -> bool {
         self.parameters.contains_key(EXCESS)
@@ -39,7 +40,7 @@ impl TextureFinding {
 
     /// Of tails: do all views have errors far out?
     pub fn are_far_errors(&self) -> bool {
-        !self.of_some && !self.are_weak_tails()
+        self.of_some.is_none() && !self.are_weak_tails()
     }
 
     /// Columns or rows that stand still, without a name.
@@ -60,7 +61,7 @@ impl TextureFinding {
             p: 1.0,
             nats: 0.0,
             words: None,
-            of_some: false,
+            of_some: None,
         }
     }
 }

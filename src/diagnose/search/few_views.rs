@@ -280,6 +280,7 @@ fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Find
         physics: physics(status, effect, statistic, axis, Some(&only))
             + &if effect.is_some() { format!(" It shows {only}.") } else { String::new() },
         shape: Some(only),
+        of_some: Some([best.views.len(), scene.survey.views.len()]),
         ..finding
     }
 }

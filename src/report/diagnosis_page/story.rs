@@ -46,7 +46,9 @@ fn of(f: &Finding) -> String {
         Some(shape) if f.status == Status::Unexplained && f.contradicted.is_none() => {
             format!(" ({shape})")
         }
-        _ => String::new(),
+        _ => {
+            f.of_some.map_or_else(String::new, |[some, all]| format!(", in {some} of {all} views"))
+        }
     };
     let size = match f.statistic {
         Statistic::Dropout => match fixed(100.0 * f.size.sigma, 1) {

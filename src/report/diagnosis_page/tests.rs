@@ -33,7 +33,7 @@ fn finding(status: Status, effect: Option<&'static str>) -> Finding {
         replicated: Some(true),
         physics: String::new(),
         next_view: None,
-        of_some: false,
+        of_some: None,
         contradicted: None,
         shape: None,
         curve: None,
@@ -291,6 +291,20 @@ fn odd_numbers_do_not_break_a_page() {
     assert!(!text.contains("NaN") && !page.contains("width:NaN"));
     let torn = ViewPictures { before: vec![0.0; 3], ..picture() };
     assert!(rendered(&diagnosis, torn).is_err());
+}
+
+/// With a name and without, once.
+#[test]
+fn what_some_views_have_is_told_of_those() {
+    let some = |f: Finding| {
+        let f = Finding { of_some: Some([5, 20]), ..f };
+        story(&diagnosis(Verdict::Mismatch, vec![f])).remove(0)
+    };
+    let told = some(finding(Status::Named, Some("row-noise")));
+    assert!(told.contains(", in 5 of 20 views: "), "{told}");
+    let shape = Some("in 5 of 20 views".to_string());
+    let told = some(Finding { shape, ..finding(Status::Unexplained, None) });
+    assert_eq!(told.matches("in 5 of 20 views").count(), 1, "{told}");
 }
 
 /// Verdict and story together; what is small, and what is not told one by one, has a sentence.
