@@ -10,48 +10,40 @@ use rayon::prelude::*;
 use statrs::function::factorial::ln_binomial;
 
 use super::candidate::{Candidate, RECALIBRATE};
+use super::each_view::EachView;
 use super::evidence::{self, Evidence, root};
 use super::noise_gains::{MIN_EXCESS, NoiseGains};
 use super::outcome::Outcome;
-use super::prepared::{Grouping, Prepared, prepare, without};
 use super::rules::Rules;
-use super::view_levels::scatter_of_most;
-use super::view_worth::{doubted, left_over};
 use crate::diagnose::diagnosis::{Alternative, Finding, Status};
 use crate::diagnose::finding::along::Along;
 use crate::diagnose::finding::naming::physics;
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::scene::{Scene, size};
-use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
-use crate::diagnose::views::tiles::SIDE;
+use crate::diagnose::views::samples::ViewData;
 use crate::rng::{Seed, Stream};
 use crate::stats::{MAD_TO_SIGMA, quantile};
-use crate::terms::{Basis, PixelContext, Statistic, Term};
+use crate::terms::{Basis, Term};
 
 /// Candidates with more columns fit single views too freely.
-const MAX_COLUMNS: usize = 16;
+pub const MAX_COLUMNS: usize = 16;
 /// Simulations of the null; its tail is an exponential's.
 const REPLICATES: u64 = 200;
 /// What all views share explains at most so many times as much: what it misses in some views is its
 /// own shape, badly met.
 const BESIDE_ALL: f64 = 10.0;
-/// What lies behind a target may be taken for its rim so far from the edge, px, and no other view
-/// outvotes it.
-const RIM_PX: f64 = SIDE as f64;
-/// A share of the weight that keeps a sample, and lets it say nothing.
-const NEXT_TO_NONE: f64 = 1e-9;
 /// A name must explain this share of what the best curve does: a few views show little of a shape.
-const NAME_ADEQUATE: f64 = 0.9;
+pub const NAME_ADEQUATE: f64 = 0.9;
 /// And so many times what a cause without a name explains in all views: a right one brought 4.6 times as much,
 /// wrong ones the same and less (three trials, three seeds of another hand).
 const BESIDE_NAMELESS: f64 = 3.0;
 
 /// A candidate in the views that show it best.
-struct Best {
+pub struct Best {
     /// Nats of a common fit to them, what the choice of them costs taken off.
-    gain: f64,
-    views: Vec<usize>,
-    beta: DVector<f64>,
+    pub gain: f64,
+    pub views: Vec<usize>,
+    pub beta: DVector<f64>,
 }
 
 /// One candidate's information, view by view, less by how much more than noise its views scatter.
@@ -63,7 +55,7 @@ struct Tried<'a> {
 }
 
 /// Best common fit of these columns to a few views.
-fn best(views: &[Evidence], prior: f64) -> Option<Best> {
+pub fn best(views: &[Evidence], prior: f64) -> Option<Best> {
     let (n, k) = (views.len(), views.first()?.b.len());
     let fit = |e: &Evidence| {
         let beta = evidence::fit(std::slice::from_ref(e), prior)?;
@@ -131,46 +123,6 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// The views as a candidate is tried on them.
-struct Views<'a> {
-    fine: &'a [ViewData],
-    coarse: &'a [ViewData],
-    /// `None` where a view says nothing.
-    prepared: Vec<Option<Prepared<'a>>>,
-    doubted: &'a [f64],
-    prior: f64,
-}
-
-impl<'a> Views<'a> {
-    fn of(
-        fine: &'a [ViewData],
-        coarse: &'a [ViewData],
-        groups: &'a [Vec<Grouping>],
-        doubted: &'a [f64],
-        prior: f64,
-    ) -> Self {
-        let prepared = |v: usize| prepare(&fine[v], &coarse[v], &groups[v], true, &[], &[]);
-        let prepared = (0..fine.len()).into_par_iter().map(prepared).collect();
-        Views { fine, coarse, prepared, doubted, prior }
-    }
-
-    /// View by view; where a view's worth is doubted, it is worth the less the more these columns leave.
-    fn evidence(&self, basis: &Basis) -> Option<Vec<Evidence>> {
-        let nothing = || Evidence::sum::<Evidence>(basis.count(), 0.0, []);
-        let of = |p: &Option<Prepared<'_>>| p.as_ref().map_or_else(nothing, |p| p.evidence(basis));
-        let mut all: Vec<Evidence> = self.prepared.iter().map(of).collect();
-        let data = if basis.needs_tiles() { self.fine } else { self.coarse };
-        let views = all.iter_mut().zip(data).zip(self.doubted);
-        for ((e, view), doubt) in views.filter(|(_, d)| **d > 1.0) {
-            let beta = evidence::fit(std::slice::from_ref(e), self.prior)?;
-            let left = left_over(view, basis, beta.as_slice()).clamp(1.0, *doubt);
-            e.a /= left;
-            e.b /= left;
-        }
-        Some(all)
-    }
-}
-
 /// The strongest such cause beside what all views share, if noise does not bring as much; `excess` is how
 /// many times less sure each view is than its samples say, where lines or views err alike.
 pub fn few_views(
@@ -185,26 +137,8 @@ pub fn few_views(
     let chosen = outcome.chosen.iter().enumerate();
     let shared: Vec<(&Basis, Vec<f64>)> =
         chosen.map(|(k, c)| (&c.candidate.basis, outcome.coefficients(k))).collect();
-    let of_mean = scene.statistic == Statistic::Bias;
-    let doubted = if of_mean { doubted(scene.survey) } else { vec![1.0; fine.len()] };
-    let alone = |(n, v): (usize, &ViewData)| {
-        let share = |p: &PixelContext| if p.edge < RIM_PX { NEXT_TO_NONE } else { 1.0 };
-        let sure = doubted[n] / excess.get(n).unwrap_or(&1.0);
-        let weight = v.places.iter().map(share).zip(&v.weight).map(|(s, w)| s * w * sure).collect();
-        ViewData { response: without(v, &shared), weight, ..v.clone() }
-    };
-    let mut fine: Vec<ViewData> = fine.iter().enumerate().map(alone).collect();
-    if !of_mean && let Some(whole) = fine.first().and_then(|v| v.precision.first()) {
-        let precision = 1.0 / scatter_of_most(&fine, 1.0 / whole);
-        fine.iter_mut().for_each(|v| v.precision[0] = precision);
-    }
-    let coarse: Vec<ViewData> = if of_mean {
-        fine.par_iter().map(|v| coarser(v, COARSE_PX)).collect()
-    } else {
-        fine.clone()
-    };
-    let groups: Vec<Vec<Grouping>> = fine.par_iter().map(Grouping::all).collect();
-    let views = Views::of(&fine, &coarse, &groups, &doubted, rules.prior);
+    let each = EachView::of(scene, fine, &shared, excess);
+    let views = each.prepared(rules.prior);
     let left_open = rules.learnt_from.map_or(1.0, |model| model.excess(fine.len() as f64));
     let tried: Vec<Tried<'_>> = candidates
         .par_iter()

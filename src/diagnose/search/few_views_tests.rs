@@ -1,7 +1,5 @@
 //! Causes of a few views, among views made by numbers.
 
-use std::sync::Arc;
-
 use super::*;
 use crate::terms::{Coordinate, Modulation};
 
@@ -33,26 +31,6 @@ fn nearly_half_of_the_views_are_few() {
     let tried = Tried::of(&slope, views("few-views/half", 1.0, 8), 0.1, 1.0).unwrap();
     let found = tried.best().unwrap();
     assert_eq!((found.views.len(), found.gain > 90.0), (8, true), "{}", found.gain);
-}
-
-/// A view without a reading takes no part, and keeps no other from it.
-#[test]
-fn a_view_that_says_nothing_leaves_the_others_alone() {
-    let place = |k: usize| PixelContext { u: k as f64, side: 4.0, ..Default::default() };
-    let view = |weight: f64| ViewData {
-        places: Arc::new((0..9).map(place).collect()),
-        response: (0..9).map(f64::from).collect(),
-        weight: vec![weight; 9],
-        nuisance: vec![1.0; 9],
-        precision: vec![0.0],
-        ..ViewData::default()
-    };
-    let slope = Basis::powers(Coordinate::Column, 1, Modulation::One);
-    let data = [view(1.0), view(0.0)];
-    let groups = data.each_ref().map(Grouping::all);
-    let views = Views::of(&data, &data, &groups, &[1.0; 2], 1.0);
-    let all = views.evidence(&slope).unwrap();
-    assert!(all[0].a.trace() > 1.0 && all[1].a.trace() == 0.0, "{all:?}");
 }
 
 #[test]

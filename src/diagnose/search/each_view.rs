@@ -1,0 +1,124 @@
+//! The views one by one, as candidates are tried on them that a part of the views may have alone.
+
+use rayon::prelude::*;
+
+use super::evidence::{self, Evidence};
+use super::prepared::{Grouping, Prepared, prepare, without};
+use super::view_levels::scatter_of_most;
+use super::view_worth::{doubted, left_over};
+use crate::diagnose::finding::scene::Scene;
+use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
+use crate::diagnose::views::tiles::SIDE;
+use crate::terms::{Basis, PixelContext, Statistic};
+
+/// What lies behind a target may be taken for its rim so far from the edge, px, and no other view
+/// outvotes it.
+const RIM_PX: f64 = SIDE as f64;
+/// A share of the weight that keeps a sample, and lets it say nothing.
+const NEXT_TO_NONE: f64 = 1e-9;
+
+/// A layer's views without what all of them share.
+pub struct EachView {
+    pub fine: Vec<ViewData>,
+    pub coarse: Vec<ViewData>,
+    groups: Vec<Vec<Grouping>>,
+    doubted: Vec<f64>,
+}
+
+/// The same, ready for the candidates.
+pub struct Views<'a> {
+    of: &'a EachView,
+    /// `None` where a view says nothing.
+    prepared: Vec<Option<Prepared<'a>>>,
+    prior: f64,
+}
+
+impl EachView {
+    /// `excess` is how many times less sure each view is than its samples say, where lines or views
+    /// err alike.
+    pub fn of(
+        scene: &Scene<'_>,
+        fine: &[ViewData],
+        shared: &[(&Basis, Vec<f64>)],
+        excess: &[f64],
+    ) -> Self {
+        let of_mean = scene.statistic == Statistic::Bias;
+        let doubted = if of_mean { doubted(scene.survey) } else { vec![1.0; fine.len()] };
+        let alone = |(n, v): (usize, &ViewData)| {
+            let share = |p: &PixelContext| if p.edge < RIM_PX { NEXT_TO_NONE } else { 1.0 };
+            let sure = doubted[n] / excess.get(n).unwrap_or(&1.0);
+            let weight =
+                v.places.iter().map(share).zip(&v.weight).map(|(s, w)| s * w * sure).collect();
+            ViewData { response: without(v, shared), weight, ..v.clone() }
+        };
+        let mut fine: Vec<ViewData> = fine.iter().enumerate().map(alone).collect();
+        if !of_mean && let Some(whole) = fine.first().and_then(|v| v.precision.first()) {
+            let precision = 1.0 / scatter_of_most(&fine, 1.0 / whole);
+            fine.iter_mut().for_each(|v| v.precision[0] = precision);
+        }
+        let coarse: Vec<ViewData> = if of_mean {
+            fine.par_iter().map(|v| coarser(v, COARSE_PX)).collect()
+        } else {
+            fine.clone()
+        };
+        EachView::grouped(fine, coarse, doubted)
+    }
+
+    fn grouped(fine: Vec<ViewData>, coarse: Vec<ViewData>, doubted: Vec<f64>) -> Self {
+        let groups = fine.par_iter().map(Grouping::all).collect();
+        EachView { fine, coarse, groups, doubted }
+    }
+
+    pub fn prepared(&self, prior: f64) -> Views<'_> {
+        let EachView { fine, coarse, groups, .. } = self;
+        let prepared = |v: usize| prepare(&fine[v], &coarse[v], &groups[v], true, &[], &[]);
+        let prepared = (0..fine.len()).into_par_iter().map(prepared).collect();
+        Views { of: self, prepared, prior }
+    }
+}
+
+impl Views<'_> {
+    /// View by view; where a view's worth is doubted, it is worth the less the more these columns leave.
+    pub fn evidence(&self, basis: &Basis) -> Option<Vec<Evidence>> {
+        let nothing = || Evidence::zeros(basis.count());
+        let of = |p: &Option<Prepared<'_>>| p.as_ref().map_or_else(nothing, |p| p.evidence(basis));
+        let mut all: Vec<Evidence> = self.prepared.iter().map(of).collect();
+        let EachView { fine, coarse, doubted, .. } = self.of;
+        let data = if basis.needs_tiles() { fine } else { coarse };
+        let views = all.iter_mut().zip(data).zip(doubted);
+        for ((e, view), doubt) in views.filter(|(_, d)| **d > 1.0) {
+            let beta = evidence::fit(std::slice::from_ref(e), self.prior)?;
+            let left = left_over(view, basis, beta.as_slice()).clamp(1.0, *doubt);
+            e.a /= left;
+            e.b /= left;
+        }
+        Some(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::terms::{Coordinate, Modulation};
+
+    /// A view without a reading takes no part, and keeps no other from it.
+    #[test]
+    fn a_view_that_says_nothing_leaves_the_others_alone() {
+        let place = |k: usize| PixelContext { u: k as f64, side: 4.0, ..Default::default() };
+        let view = |weight: f64| ViewData {
+            places: Arc::new((0..9).map(place).collect()),
+            response: (0..9).map(f64::from).collect(),
+            weight: vec![weight; 9],
+            nuisance: vec![1.0; 9],
+            precision: vec![0.0],
+            ..ViewData::default()
+        };
+        let slope = Basis::powers(Coordinate::Column, 1, Modulation::One);
+        let data = vec![view(1.0), view(0.0)];
+        let each = EachView::grouped(data.clone(), data, vec![1.0; 2]);
+        let all = each.prepared(1.0).evidence(&slope).unwrap();
+        assert!(all[0].a.trace() > 1.0 && all[1].a.trace() == 0.0, "{all:?}");
+    }
+}
