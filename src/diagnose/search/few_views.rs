@@ -182,7 +182,9 @@ fn told<'a>(all: &'a [(&'a Candidate, Best)], nameless: f64) -> Option<&'a (&'a 
     };
     let adequate = f64::max(NAME_ADEQUATE * most, BESIDE_NAMELESS * nameless);
     let names = || all.iter().filter(|(c, b)| c.family.is_some() && b.gain > adequate);
-    names().find(clear).or(curves().next()).or(names().next())
+    // The level of one view's noise follows any law.
+    let alone = names().next().filter(|(first, _)| names().all(|(c, _)| c.family == first.family));
+    alone.filter(clear).or(curves().next()).or(names().next())
 }
 
 fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {

@@ -4,7 +4,7 @@
 pub mod bias;
 pub mod candidate;
 pub mod choose;
-pub mod each_view;
+mod each_view;
 pub mod evidence;
 pub mod few_views;
 pub mod judge;

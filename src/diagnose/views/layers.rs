@@ -17,7 +17,7 @@ use crate::diagnose::search::view_levels::{MODEL_TOLERANCE, view_scatter};
 use crate::effects::Flat;
 use crate::measure::Workbench;
 use crate::sensors::SensorKind;
-use crate::stats::Correlation;
+use crate::stats::{Correlation, median};
 use crate::terms::{Extent, PixelContext, Term};
 
 /// The tiles of all views, with how much each view is worth.
@@ -47,6 +47,29 @@ pub struct Survey {
     pub ablation: Ablation,
 }
 
+/// Fewer independent samples do not show how they hang together: a correlation of so many errs by a
+/// tenth, and what a view's mean took with it makes it look shorter.
+const FEW_SAMPLES: f64 = 100.0;
+
+/// What the views' means are worth, and how their pixels hang together, with this bias taken out. The
+/// views of one sensor are matched by one window: a view too small to show it has that of the middle one.
+fn inflations(fields: &[Field], bias: &[Vec<f32>]) -> Vec<(f64, Correlation)> {
+    let of = |(n, f): (usize, &Field)| inflation(f, bias.get(n).map_or(&[], |b| &b[..]));
+    let mut all: Vec<(f64, Correlation)> = fields.par_iter().enumerate().map(of).collect();
+    let middle = |of: &dyn Fn(&Correlation) -> f64| {
+        median(&mut all.iter().map(|(_, c)| of(c)).collect::<Vec<f64>>())
+    };
+    let (sum, squares) = (middle(&|c| c.sum), middle(&|c| c.sum_of_squares));
+    for ((inflation, correlation), field) in all.iter_mut().zip(fields) {
+        if (field.pixels.len() as f64) < FEW_SAMPLES * squares {
+            *inflation *= (sum / correlation.sum).max(1.0);
+            correlation.sum = correlation.sum.max(sum);
+            correlation.sum_of_squares = correlation.sum_of_squares.max(squares);
+        }
+    }
+    all
+}
+
 impl Survey {
     pub fn of(fields: &[Field], bench: &Workbench<'_>) -> Self {
         let camera = &bench.sensor.camera;
@@ -55,9 +78,9 @@ impl Survey {
             fields.iter().map(|f| (f.plane.distance(), f.plane.theta())).collect();
         let mut views: Vec<SurveyedView> = fields
             .par_iter()
+            .zip(inflations(fields, &[]))
             .zip(halves(&poses))
-            .map(|(f, in_second_half)| {
-                let (inflation, correlation) = inflation(f, &[]);
+            .map(|((f, (inflation, correlation)), in_second_half)| {
                 let (places, tiles) = tiles(f, camera, &bench.rays, start);
                 SurveyedView {
                     name: f.name.clone(),
@@ -125,8 +148,7 @@ impl Survey {
     /// by view and pixel. `false`, and nothing is changed, where that changes little.
     pub fn reweigh(&mut self, fields: &[Field], bias: &[Vec<f32>]) -> bool {
         const LITTLE: f64 = 1.3;
-        let views = fields.par_iter().zip(bias);
-        let anew: Vec<(f64, Correlation)> = views.map(|(f, b)| inflation(f, b)).collect();
+        let anew = inflations(fields, bias);
         let more = |(view, new): (&SurveyedView, &(f64, Correlation))| {
             new.0 > 0.0 && view.inflation > LITTLE * new.0
         };
