@@ -5,7 +5,7 @@
 //! row shares; the products with a box around each pixel are that of one it shares with its
 //! neighbours. Each costs a pass over the image.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::texture::without_outliers;
 use crate::diagnose::views::box_sums::over_boxes;
@@ -34,7 +34,8 @@ pub struct Pairs {
 impl Pairs {
     /// Of an image of the noise, whatever plane it holds taken out; NaN where there is nothing.
     pub fn of(image: &[f32], width: usize) -> Option<Self> {
-        let level = without_outliers(&without_plane(image, width)?);
+        let (level, plane) = Plane::taken_from(image, width)?;
+        let level = without_outliers(&level);
         let height = level.len() / width;
         let pixels = level.iter().filter(|r| r.is_finite()).count() as f64;
         let power = mean(level.iter().map(|r| f64::from(*r).powi(2)))?;
@@ -42,19 +43,23 @@ impl Pairs {
         if beside.pairs < FEWEST_PAIRS {
             return None;
         }
-        // The plane took a little of every pair with it: of its three degrees of freedom the level
-        // and one slope are a line's.
-        let taken = (power + beside.products / pixels) / pixels;
+        // The plane took a little of every product with it: the noise of so many pixels as hang together
+        // times the two pixels' leverage, of which neighbours have three, as a pixel with itself.
+        let taken = power + beside.products / pixels;
         let lines = |count: usize, length: usize, at: &dyn Fn(usize, usize) -> usize| {
-            let sum = (0..count).fold(Sum::default(), |sum, line| {
-                sum.and(along((0..length).map(|k| level[at(line, k)])))
-            });
-            (sum.pairs >= FEWEST_PAIRS).then(|| sum.products / sum.pairs + 2.0 * taken)
+            let (mut sum, mut leverage) = (Sum::default(), 0.0);
+            for line in 0..count {
+                let pixels = || (0..length).map(|k| at(line, k));
+                sum = sum.and(along(pixels().map(|i| level[i])));
+                leverage += plane.leverage_along(&level, pixels);
+            }
+            let mean = || (sum.products + taken * leverage) / sum.pairs;
+            (sum.pairs >= FEWEST_PAIRS).then(mean)
         };
         let row = lines(height, width, &|line, k| line * width + k);
         let column = lines(width, height, &|line, k| k * width + line);
         let shared = (row.unwrap_or(0.0) + column.unwrap_or(0.0)) * ON_THE_LINE;
-        let near = beside.products / beside.pairs + 3.0 * taken - shared;
+        let near = beside.products / beside.pairs + 3.0 * taken / pixels - shared;
         Some(Pairs { power, row, column, near })
     }
 }
@@ -117,18 +122,60 @@ fn neighbours(image: &[f32], width: usize) -> Sum {
     sum
 }
 
-/// Less its plane by least squares; `None` with too few pixels for one.
-fn without_plane(image: &[f32], width: usize) -> Option<Vec<f32>> {
-    let (u0, v0) = (0.5 * width as f64, 0.5 * (image.len() / width) as f64);
-    let place = |i: usize| [((i % width) as f64 - u0) / u0, ((i / width) as f64 - v0) / v0];
-    let points = image.iter().enumerate().map(|(i, r)| (place(i), f64::from(*r), 1.0));
-    let (a, b) = plane_equations(points);
-    let plane = a.cholesky()?.solve(&b);
-    let less = |(i, r): (usize, &f32)| {
-        let [x, y] = place(i);
-        r - plane.dot(&Vector3::new(1.0, x, y)) as f32
-    };
-    Some(image.iter().enumerate().map(less).collect())
+/// A plane fitted to an image by least squares.
+struct Plane {
+    width: usize,
+    centre: [f64; 2],
+    /// Of its normal equations.
+    inverse: Matrix3<f64>,
+}
+
+impl Plane {
+    /// The image less its plane; `None` with too few pixels for one.
+    fn taken_from(image: &[f32], width: usize) -> Option<(Vec<f32>, Plane)> {
+        let centre = [width, image.len() / width].map(|side| 0.5 * side as f64);
+        let mut plane = Plane { width, centre, inverse: Matrix3::zeros() };
+        let points = image.iter().enumerate().map(|(i, r)| (plane.place(i), f64::from(*r), 1.0));
+        let (a, b) = plane_equations(points);
+        let factor = a.cholesky()?;
+        let fit = factor.solve(&b);
+        plane.inverse = factor.inverse();
+        let less = |(i, r): (usize, &f32)| r - fit.dot(&plane.columns(i)) as f32;
+        Some((image.iter().enumerate().map(less).collect(), plane))
+    }
+
+    fn place(&self, i: usize) -> [f64; 2] {
+        let [u0, v0] = self.centre;
+        [((i % self.width) as f64 - u0) / u0, ((i / self.width) as f64 - v0) / v0]
+    }
+
+    fn columns(&self, i: usize) -> Vector3<f64> {
+        let [x, y] = self.place(i);
+        Vector3::new(1.0, x, y)
+    }
+
+    /// Leverage of two pixels of a line on one another, summed over the pairs of [`along`].
+    fn leverage_along<I>(&self, image: &[f32], line: impl Fn() -> I) -> f64
+    where
+        I: Iterator<Item = usize>,
+    {
+        let (Some(first), Some(last)) = (line().next(), line().last()) else { return 0.0 };
+        let (start, way) = (self.columns(first), self.columns(last) - self.columns(first));
+        let step = (line().count() as f64 - 1.0).max(1.0);
+        // Products of a pixel's place on the line, from 0 to 1, and of one more than that.
+        let products = |more: f64| {
+            let place = line().enumerate().map(|(k, i)| {
+                if image[i].is_finite() { (more + k as f64 / step) as f32 } else { f32::NAN }
+            });
+            along(place)
+        };
+        let (of_place, of_more) = (products(0.0), products(1.0));
+        let once = of_more.products - of_place.products - of_place.pairs;
+        let of = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(&(self.inverse * b));
+        of_place.pairs * of(&start, &start)
+            + once * of(&start, &way)
+            + of_place.products * of(&way, &way)
+    }
 }
 
 #[cfg(test)]
@@ -175,6 +222,30 @@ mod tests {
         near(&all, |p| p.row.unwrap(), 0.0);
         near(&all, |p| p.column.unwrap(), 0.0);
         near(&all, |p| p.near, 0.0);
+    }
+
+    /// Boxes of 5 px in a picture of three blocks of a line: pairs of its first and its last lie at opposite
+    /// ends of the plane's slope.
+    #[test]
+    fn noise_through_a_window_shares_nothing_along_a_line() {
+        const BOX: usize = 5;
+        const SIDE: usize = 48;
+        let one = |n: u64| {
+            let mut rng = Seed(n).stream("pairs/window");
+            let wide = SIDE + BOX;
+            let white: Vec<f64> =
+                (0..wide * wide).map(|_| StandardNormal.sample(&mut rng)).collect();
+            let of_box = |u: usize, v: usize| {
+                (v..v + BOX).map(|v| white[v * wide + u..][..BOX].iter().sum::<f64>()).sum::<f64>()
+            };
+            let image: Vec<f32> = (0..SIDE * SIDE)
+                .map(|i| (of_box(i % SIDE, i / SIDE) / BOX as f64) as f32)
+                .collect();
+            Pairs::of(&image, SIDE).unwrap()
+        };
+        let all: Vec<Pairs> = (0..2000).map(one).collect();
+        near(&all, |p| p.row.unwrap(), 0.0);
+        near(&all, |p| p.column.unwrap(), 0.0);
     }
 
     #[test]
