@@ -53,7 +53,10 @@ const SPREADS: [&str; 6] = [
 ];
 
 fn spreads(f: &Finding) -> bool {
-    let named = matches!(f.status, Status::Named | Status::OneOf) && f.of_some.is_none();
+    // The size of a texture that some views have is theirs; a mean error's is all views'.
+    let of_all =
+        f.of_some.is_none() || f.statistic == Statistic::Bias && f.axis != Axis::EdgeDistance;
+    let named = matches!(f.status, Status::Named | Status::OneOf) && of_all;
     named && (f.statistic == Statistic::Bias || f.effect.is_some_and(|id| SPREADS.contains(&id)))
 }
 

@@ -33,11 +33,17 @@ pub(super) fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>)
     }
 }
 
-/// A name is told once, by its strongest finding.
+/// A name is told once, by its strongest finding, of those in all views if there is one: the model has
+/// that.
 pub(super) fn merge(found: &mut Vec<Finding>) {
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let of_all: BTreeSet<&str> =
+        found.iter().filter(|f| f.of_some.is_none()).filter_map(|f| f.effect).collect();
     let mut names = BTreeSet::new();
-    found.retain(|f| f.effect.is_none_or(|id| names.insert(id)));
+    found.retain(|f| {
+        let told = |id| f.of_some.is_some() && of_all.contains(id);
+        f.effect.is_none_or(|id| !told(id) && names.insert(id))
+    });
 }
 
 /// Of ten such names on development seeds (501, 777, 902) none was the cause: by Jeffreys's prior.

@@ -41,8 +41,8 @@ impl RandomEffects {
     }
 }
 
-/// The common value alone, and its standard error, which is one of Student's t of one degree of
-/// freedom less than there are units.
+/// The common value alone, and its standard error; the two make a Student's t with one degree of freedom
+/// less than there are units.
 pub fn common_value(units: &[(f64, f64)]) -> Option<[f64; 2]> {
     let usable = |(y, v): &(f64, f64)| y.is_finite() && v.is_finite() && *v > 0.0;
     if units.len() < 2 || !units.iter().all(usable) {

@@ -95,8 +95,8 @@ pub fn mean_share(
     combined(&(0..views.len()).filter_map(of).collect::<Vec<_>>())
 }
 
-/// Mean of (value, information) with the scatter between views, by which a view that its noise makes sure
-/// of does not decide alone; and how well the mean by the noise explains them.
+/// Mean of (value, information) with the scatter between views, so that no view decides alone because its
+/// noise is small; and how well the mean by the noise alone explains them.
 fn combined(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
     let units: Vec<(f64, f64)> = views.iter().map(|(v, sure)| (*v, 1.0 / sure)).collect();
     let [value, std_error] = common_value(&units)?;
@@ -163,4 +163,22 @@ fn found(edges: &[&Edges], (width, (share, _)): Footprint, p: f64) -> Option<Tex
         )),
         ..TextureFinding::named(vec!["edge-mixing"], Statistic::Bias, Axis::EdgeDistance)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two runs differ view by view: one view of little noise is off by nine times its own, the others
+    /// by as much to either side.
+    #[test]
+    fn one_view_of_little_noise_does_not_decide_alone() {
+        let others = (0..9).map(|k| (0.03 * f64::from(k - 4) / 4.0, 1e4));
+        let views: Vec<(f64, f64)> = others.chain([(0.03, 9e4)]).collect();
+        let (share, _) = combined(&views).unwrap();
+        assert!(share.p_above(0.0) > 0.05, "{share:?}");
+        let agreed: Vec<(f64, f64)> = views.iter().map(|(_, sure)| (0.03, *sure)).collect();
+        let (share, _) = combined(&agreed).unwrap();
+        assert!(share.p_above(0.0) < 1e-4 && (share.value - 0.03).abs() < 1e-9, "{share:?}");
+    }
 }

@@ -144,20 +144,18 @@ impl DropoutSearch<'_> {
             }
             // Steps that begin in the midst of the session are tried where none is found that is always there.
             // Few views show how they scatter from then on: that is not trusted below what is usual.
-            let begins = outcome.findings.is_empty() && always.won().is_none();
-            let round = if begins { of(&open.begun, USUAL) } else { Some(always) };
-            let Some(Round { ledger, judged, noise }) = &round else { break };
-            let Some(won) = round.as_ref().and_then(Round::won) else { break };
+            let mut won = self.won(&always, seen);
+            let mut round = always;
+            if outcome.findings.is_empty() && won.is_none() {
+                let Some(begun) = of(&open.begun, USUAL) else { break };
+                (won, round) = (self.won(&begun, seen), begun);
+            }
+            let Some((won, counts)) = won else { break };
+            let (won, Round { ledger, judged, noise }) = (&round.judged[won], &round);
             if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.share) {
                 break;
             }
-            let p = noise.p(match seen.expected {
-                Some(_) => ledger.beyond_one_view(won),
-                None => won.gain,
-            });
-            if p > LEVEL / TESTS {
-                break;
-            }
+            let p = noise.p(counts);
             let told = |won: &Judged| {
                 let rivals = rivals(std::iter::once(won).chain(judged));
                 let finding = self.reporter(seen, ledger.base).finding(won, &rivals, TESTS * p);
@@ -182,6 +180,34 @@ impl DropoutSearch<'_> {
             return self.few(seen, outcome);
         }
         outcome
+    }
+
+    /// What is seen in a round, by its number, and the nats that count for it. Held against a twin one view more
+    /// must show it, but a hard end of the range, which the farthest may cross alone.
+    fn won(&self, round: &Round<'_>, seen: &DropoutCells<'_>) -> Option<(usize, f64)> {
+        let Round { ledger, judged, .. } = round;
+        let threshold = round.threshold();
+        let mut open: Vec<usize> =
+            (0..judged.len()).take_while(|&k| judged[k].gain > threshold).collect();
+        if seen.expected.is_none() {
+            return choose(judged, &open).map(|k| (k, judged[k].gain));
+        }
+        let ends = |won: &Judged| {
+            let finding = self.reporter(seen, ledger.base).finding(won, &rivals([won]), 0.0);
+            self.end(&finding, ledger.base).is_some()
+        };
+        let first = choose(judged, &open)?;
+        if ends(&judged[first]) {
+            return Some((first, judged[first].gain));
+        }
+        while let Some(k) = choose(judged, &open) {
+            let counts = ledger.beyond_one_view(&judged[k]);
+            if counts > threshold {
+                return Some((k, counts));
+            }
+            open.retain(|other| *other != k);
+        }
+        None
     }
 
     /// Where nothing else is found: losses too few to be a share of a patch.
@@ -261,7 +287,8 @@ impl<'a> Round<'a> {
     ) -> Option<Self> {
         let ledger = Losses::new(views, explained);
         let (first, _) = ledger.judge(steps, curves, None);
-        let ledger = ledger.scattered_as_left_by(choose(&first)?, least);
+        let all: Vec<usize> = (0..first.len()).collect();
+        let ledger = ledger.scattered_as_left_by(&first[choose(&first, &all)?], least);
         let (judged, noise) = ledger.judge(steps, curves, Some(seed));
         Some(Round { ledger, judged, noise })
     }
@@ -269,19 +296,15 @@ impl<'a> Round<'a> {
     fn threshold(&self) -> f64 {
         self.noise.threshold(LEVEL / TESTS)
     }
-
-    fn won(&self) -> Option<&Judged> {
-        let seen = self.judged.partition_point(|j| j.gain > self.threshold());
-        choose(&self.judged[..seen])
-    }
 }
 
-/// The best step, unless the best curve leaves it behind.
-fn choose(judged: &[Judged]) -> Option<&Judged> {
-    let best = |named: bool| judged.iter().find(|j| j.shape.family().is_some() == named);
+/// Of these, best first, the best step, unless the best curve leaves it behind; by its number.
+fn choose(judged: &[Judged], among: &[usize]) -> Option<usize> {
+    let best =
+        |named: bool| among.iter().copied().find(|&k| judged[k].shape.family().is_some() == named);
     let (step, curve) = (best(true), best(false));
-    let enough = curve.map_or(0.0, |c| NAME_ADEQUATE * c.gain);
-    step.filter(|s| s.gain > enough).or(curve)
+    let enough = curve.map_or(0.0, |c| NAME_ADEQUATE * judged[c].gain);
+    step.filter(|&s| judged[s].gain > enough).or(curve)
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@ use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::Null;
 use crate::rng::Seed;
-use crate::stats::range;
 use crate::terms::Basis;
 
 /// Precision of a step's size about the whole one: half of it is as likely as one and a half.
@@ -150,32 +149,30 @@ impl<'a> Losses<'a> {
         Column { step, by_view, a }
     }
 
-    /// What it brings without the view that says the most of it. A view and its twin differ by where their
-    /// clumps of losses happen to lie: one in a corner of the steepest view is no law of the tilt.
+    /// What it brings without the view that it can do without least. A view and its twin differ by where
+    /// their clumps of losses happen to lie: one in a corner of the steepest view is no law of the tilt.
     pub fn beyond_one_view(&self, judged: &Judged) -> f64 {
-        let without = |by_view: &[f64]| {
-            let [_, most] = range(by_view.iter().copied());
-            by_view.iter().position(|gain| *gain == most).unwrap_or(0)
-        };
-        match &judged.shape {
+        let without: Box<dyn Fn(usize) -> f64> = match &judged.shape {
             Shape::Step(step) => {
-                let (mut a, mut b) = self.information(*step);
-                let gains: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b - 0.5 * a).collect();
-                let one = without(&gains);
-                (a[one], b[one]) = (0.0, 0.0);
-                predicted(&a, &b).0 - step.cost()
+                let (a, b) = self.information_and_score(*step);
+                let beside = |of: &[f64], one: usize| [&of[..one], &of[one + 1..]].concat();
+                let cost = step.cost();
+                Box::new(move |one| predicted(&beside(&a, one), &beside(&b, one)).0 - cost)
             }
             Shape::Curve(basis) => {
-                let mut evidence = self.evidence(basis);
-                let Some(all) = gain(&evidence, CURVE_PRECISION) else { return 0.0 };
-                evidence.remove(without(&all.by_view));
-                gain(&evidence, CURVE_PRECISION).map_or(0.0, |rest| rest.total)
+                let evidence = self.evidence(basis);
+                Box::new(move |one| {
+                    let mut rest = evidence.clone();
+                    rest.remove(one);
+                    gain(&rest, CURVE_PRECISION).map_or(0.0, |rest| rest.total)
+                })
             }
-        }
+        };
+        (0..self.views.len()).map(without).fold(judged.gain, f64::min)
     }
 
     /// A step's information and score in every view.
-    fn information(&self, step: Step) -> (Vec<f64>, Vec<f64>) {
+    fn information_and_score(&self, step: Step) -> (Vec<f64>, Vec<f64>) {
         let column = self.column(step);
         let solve = |(w, y): (&Whitener, &Vec<f64>)| w.solve(y);
         let whitened: Vec<Vec<f64>> = self.whiteners.iter().zip(&self.left).map(solve).collect();
@@ -187,7 +184,7 @@ impl<'a> Losses<'a> {
     pub fn replicate(&self, judged: &Judged, second: &[bool]) -> Option<bool> {
         match &judged.shape {
             Shape::Step(step) => {
-                let (a, b) = self.information(*step);
+                let (a, b) = self.information_and_score(*step);
                 let half = |which: bool| {
                     let views = a.iter().zip(&b).zip(second);
                     let mine = views.filter(|(_, s)| **s == which);

@@ -132,6 +132,24 @@ fn clumps_that_lie_elsewhere_in_another_run_are_no_difference() {
     assert!(alarms <= 1 && seen >= 18, "{alarms} {seen}");
 }
 
+/// A clump at the far side of the steepest view is no law, at whatever tilt it begins; what all steep views lose is.
+#[test]
+fn what_one_view_loses_beside_its_twin_is_no_law() {
+    let (none, camera) = session(0.0, &mut Seed(2).stream("twins/one"), |_| 0.0);
+    let steepest = |view: &[Patch]| view.iter().map(|p| p.place.theta).fold(0.0, f64::max);
+    let mut tilts: Vec<f64> = none.iter().map(|v| steepest(v)).collect();
+    tilts.sort_by(f64::total_cmp);
+    let lost_from = |tilt: f64| {
+        let mut views = none.clone();
+        for p in views.iter_mut().flatten().filter(|p| p.place.theta >= tilt) {
+            p.lost = 0.3 * p.asked;
+        }
+        find_beside(&views, Some(&none), &camera, Seed(2)).findings.len()
+    };
+    let n = tilts.len();
+    assert_eq!([lost_from(tilts[n - 1]), lost_from(tilts[n - 6]).min(1)], [0, 1]);
+}
+
 fn parameter(finding: &Finding, name: &str) -> [f64; 2] {
     ["value", "std_error"].map(|of| finding.parameters[name][of].as_f64().unwrap())
 }

@@ -3,7 +3,7 @@
 //!
 //! With S the sum over a row, S^2 less what is on the diagonal is the score of a variance that the
 //! row shares; the products with a box around each pixel are that of one it shares with its
-//! neighbours. Each costs a pass over the image.
+//! neighbours. Each costs a few passes over the image.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -43,8 +43,9 @@ impl Pairs {
         if beside.pairs < FEWEST_PAIRS {
             return None;
         }
-        // The plane took a little of every product with it: the noise of so many pixels as hang together
-        // times the two pixels' leverage, of which neighbours have three, as a pixel with itself.
+        // The plane took a little of every product with it: the noise of as many pixels as hang together
+        // within the reach, times the leverage of the two pixels on one another. Of neighbours that is three
+        // over the number of pixels on average, as of a pixel on itself.
         let taken = power + beside.products / pixels;
         let lines = |count: usize, length: usize, at: &dyn Fn(usize, usize) -> usize| {
             let (mut sum, mut leverage) = (Sum::default(), 0.0);
@@ -53,8 +54,7 @@ impl Pairs {
                 sum = sum.and(along(pixels().map(|i| level[i])));
                 leverage += plane.leverage_along(&level, pixels);
             }
-            let mean = || (sum.products + taken * leverage) / sum.pairs;
-            (sum.pairs >= FEWEST_PAIRS).then(mean)
+            (sum.pairs >= FEWEST_PAIRS).then(|| (sum.products + taken * leverage) / sum.pairs)
         };
         let row = lines(height, width, &|line, k| line * width + k);
         let column = lines(width, height, &|line, k| k * width + line);

@@ -19,8 +19,8 @@ const NEXT_TO_NONE: f64 = 1e-9;
 
 /// A layer's views without what all of them share.
 pub struct EachView {
-    pub fine: Vec<ViewData>,
-    pub coarse: Vec<ViewData>,
+    fine: Vec<ViewData>,
+    coarse: Vec<ViewData>,
     groups: Vec<Vec<Grouping>>,
     doubted: Vec<f64>,
 }

@@ -26,24 +26,24 @@ use crate::stats::{MAD_TO_SIGMA, quantile};
 use crate::terms::{Basis, Term};
 
 /// Candidates with more columns fit single views too freely.
-pub const MAX_COLUMNS: usize = 16;
+const MAX_COLUMNS: usize = 16;
 /// Simulations of the null; its tail is an exponential's.
 const REPLICATES: u64 = 200;
 /// What all views share explains at most so many times as much: what it misses in some views is its
 /// own shape, badly met.
 const BESIDE_ALL: f64 = 10.0;
 /// A name must explain this share of what the best curve does: a few views show little of a shape.
-pub const NAME_ADEQUATE: f64 = 0.9;
+const NAME_ADEQUATE: f64 = 0.9;
 /// And so many times what a cause without a name explains in all views: a right one brought 4.6 times as much,
 /// wrong ones the same and less (three trials, three seeds of another hand).
 const BESIDE_NAMELESS: f64 = 3.0;
 
 /// A candidate in the views that show it best.
-pub struct Best {
+struct Best {
     /// Nats of a common fit to them, what the choice of them costs taken off.
-    pub gain: f64,
-    pub views: Vec<usize>,
-    pub beta: DVector<f64>,
+    gain: f64,
+    views: Vec<usize>,
+    beta: DVector<f64>,
 }
 
 /// One candidate's information, view by view, less by how much more than noise its views scatter.
@@ -55,7 +55,7 @@ struct Tried<'a> {
 }
 
 /// Best common fit of these columns to a few views.
-pub fn best(views: &[Evidence], prior: f64) -> Option<Best> {
+fn best(views: &[Evidence], prior: f64) -> Option<Best> {
     let (n, k) = (views.len(), views.first()?.b.len());
     let fit = |e: &Evidence| {
         let beta = evidence::fit(std::slice::from_ref(e), prior)?;
@@ -166,48 +166,73 @@ pub fn few_views(
         return None;
     }
     let nameless = outcome.chosen.iter().filter(|c| c.candidate.family.is_none());
-    let (candidate, best) = told(&all, nameless.map(|c| c.gain).fold(0.0, f64::max))?;
-    Some(report(scene, candidate, best, noise.p(most)))
+    let (told, names) = told(&all, nameless.map(|c| c.gain).fold(0.0, f64::max))?;
+    Some(report(scene, told, &names, noise.p(told.1.gain)))
 }
 
-/// Of the candidates, best first, the name or else the curve to report. In a few views much looks alike: a
-/// name must be better than what has none on another axis, and by far than what has none in all views,
-/// `nameless`: this one's misfit in some of them looks like anything.
-fn told<'a>(all: &'a [(&'a Candidate, Best)], nameless: f64) -> Option<&'a (&'a Candidate, Best)> {
-    let most = all.first()?.1.gain;
+/// More names than these are none.
+const MAX_NAMES: usize = 3;
+
+/// Of the candidates, best first, the one to report, and the names it may have, none for a curve. In a few views
+/// much looks alike: a name must be better than what has none on another axis, and by far than what has none in all
+/// views, `nameless`: this one's misfit in some of them looks like anything. What one view's level of noise is, any
+/// cause of the catalogue explains.
+fn told<'a>(
+    all: &'a [(&'a Candidate, Best)],
+    nameless: f64,
+) -> Option<(&'a (&'a Candidate, Best), Vec<&'static str>)> {
+    let first = all.first()?;
+    let most = first.1.gain;
     let curves = || all.iter().filter(|(c, _)| c.family.is_none());
     let clear = |(c, b): &&(&Candidate, Best)| {
         let mut others = curves().filter(|o| o.0.basis.axis() != c.basis.axis());
         others.all(|o| o.1.gain < NAME_ADEQUATE * b.gain)
     };
     let adequate = f64::max(NAME_ADEQUATE * most, BESIDE_NAMELESS * nameless);
-    let names = || all.iter().filter(|(c, b)| c.family.is_some() && b.gain > adequate);
-    // The level of one view's noise follows any law.
-    let alone = names().next().filter(|(first, _)| names().all(|(c, _)| c.family == first.family));
-    alone.filter(clear).or(curves().next()).or(names().next())
+    let named = || all.iter().filter(|(c, b)| c.family.is_some() && b.gain > adequate);
+    let mut names: Vec<&'static str> = Vec::new();
+    for family in named().filter_map(|(c, _)| c.family) {
+        if !names.contains(&family) {
+            names.push(family);
+        }
+    }
+    if let Some(found) = named().next().filter(clear).filter(|_| names.len() <= MAX_NAMES) {
+        return Some((found, names));
+    }
+    let curve = curves().next().filter(|(_, b)| b.gain > NAME_ADEQUATE * most);
+    Some((curve.unwrap_or(first), Vec::new()))
 }
 
-fn report(scene: &Scene<'_>, candidate: &Candidate, best: &Best, p: f64) -> Finding {
+fn report(
+    scene: &Scene<'_>,
+    (candidate, best): &(&Candidate, Best),
+    names: &[&'static str],
+    p: f64,
+) -> Finding {
     let (statistic, axis) = (scene.statistic, candidate.basis.axis());
     let coefficients = best.beta.as_slice().to_vec();
     let term = Term { statistic, basis: candidate.basis.clone(), coefficients };
     let mut values = scene.values(&term);
     let others = (0..values.len()).filter(|v| !best.views.contains(v)).collect::<Vec<_>>();
     others.into_iter().for_each(|v| values[v].iter_mut().for_each(|x| *x = 0.0));
-    let status = if candidate.family.is_some() { Status::Named } else { Status::Unexplained };
-    let mut names: Vec<&str> =
+    let status = match names.len() {
+        0 => Status::Unexplained,
+        1 => Status::Named,
+        _ => Status::OneOf,
+    };
+    let mut views: Vec<&str> =
         best.views.iter().map(|&v| scene.survey.views[v].name.as_str()).collect();
-    names.sort_unstable();
-    let only = format!("only in the views {}", names.join(", "));
-    let effect = candidate.family;
+    views.sort_unstable();
+    let only = format!("only in the views {}", views.join(", "));
+    let effect = names.first().copied();
     let along = Along::of(scene, &candidate.basis);
     let finding = named(effect.unwrap_or_default(), statistic, axis);
     Finding {
         status,
         effect,
-        alternatives: effect
-            .map(|effect| Alternative { effect, probability: None })
-            .into_iter()
+        alternatives: names
+            .iter()
+            .map(|&effect| Alternative { effect, probability: None })
             .collect(),
         interval: along.interval(scene, &values),
         share: best.gain,

@@ -50,6 +50,7 @@ fn a_name_is_better_than_curves_on_other_axes() {
     let [own, other] = [columns, distance].map(Candidate::curve);
     let found =
         |candidate, gain| (candidate, Best { gain, views: vec![3], beta: DVector::zeros(6) });
+    let name_of = |all: &[_], nameless| told(all, nameless).unwrap().1.first().copied();
     let cases = [
         (&other, 95.0, None),
         (&other, 60.0, Some("column-banding")),
@@ -57,14 +58,36 @@ fn a_name_is_better_than_curves_on_other_axes() {
     ];
     for (curve, gain, name) in cases {
         let all = [found(&bands, 100.0), found(curve, gain)];
-        assert_eq!(told(&all, 0.0).unwrap().0.family, name, "{gain}");
-        assert_eq!(
-            told(&all, 20.0).unwrap().0.family,
-            name,
-            "{gain}, much more than what has none"
-        );
-        assert_eq!(told(&all, 90.0).unwrap().0.family, None, "{gain}, about what has no name");
+        assert_eq!(name_of(&all, 0.0), name, "{gain}");
+        assert_eq!(name_of(&all, 20.0), name, "{gain}, much more than what has none");
+        assert_eq!(name_of(&all, 90.0), None, "{gain}, about what has no name");
     }
     let all = [found(&other, 100.0), found(&bands, 80.0)];
-    assert_eq!(told(&all, 0.0).unwrap().0.family, None, "a name that explains too little");
+    assert_eq!(name_of(&all, 0.0), None, "a name that explains too little");
+}
+
+/// One view's level of noise: so many causes explain it that none is told, nor a curve that pays more for its
+/// columns than is left of it; two of them are.
+#[test]
+fn what_many_causes_explain_has_no_name() {
+    let level = |id| Candidate::named(id, Basis::Level);
+    let causes =
+        ["slope-noise", "range-exponent", "tilt-axis-anisotropy", "ambient-light"].map(level);
+    let curve = Candidate::curve(Basis::Ring {
+        over: Coordinate::Column,
+        period: 1.0,
+        nodes: 8,
+        times: Modulation::One,
+    });
+    let found =
+        |candidate, gain| (candidate, Best { gain, views: vec![3], beta: DVector::zeros(1) });
+    let with = |causes| -> Vec<(&Candidate, Best)> {
+        let causes: &[Candidate] = causes;
+        causes.iter().map(|c| found(c, 24.5)).chain([found(&curve, 4.0)]).collect()
+    };
+    let all = with(&causes[..]);
+    let ((_, best), names) = told(&all, 0.0).unwrap();
+    assert!(names.is_empty() && best.gain == 24.5, "{names:?}");
+    let two = with(&causes[..2]);
+    assert_eq!(told(&two, 0.0).unwrap().1, ["slope-noise", "range-exponent"]);
 }

@@ -52,16 +52,20 @@ pub struct Survey {
 const FEW_SAMPLES: f64 = 100.0;
 
 /// What the views' means are worth, and how their pixels hang together, with this bias taken out. The
-/// views of one sensor are matched by one window: a view too small to show it has that of the middle one.
+/// views of one sensor are matched by one window: a view too small to show it has at least the middle one
+/// of the larger half of the views.
 fn inflations(fields: &[Field], bias: &[Vec<f32>]) -> Vec<(f64, Correlation)> {
     let of = |(n, f): (usize, &Field)| inflation(f, bias.get(n).map_or(&[], |b| &b[..]));
     let mut all: Vec<(f64, Correlation)> = fields.par_iter().enumerate().map(of).collect();
+    let pixels = |f: &Field| f.pixels.len() as f64;
+    let middle_px = median(&mut fields.iter().map(pixels).collect::<Vec<f64>>());
     let middle = |of: &dyn Fn(&Correlation) -> f64| {
-        median(&mut all.iter().map(|(_, c)| of(c)).collect::<Vec<f64>>())
+        let large = all.iter().zip(fields).filter(|(_, f)| pixels(f) >= middle_px);
+        median(&mut large.map(|((_, c), _)| of(c)).collect::<Vec<f64>>())
     };
     let (sum, squares) = (middle(&|c| c.sum), middle(&|c| c.sum_of_squares));
     for ((inflation, correlation), field) in all.iter_mut().zip(fields) {
-        if (field.pixels.len() as f64) < FEW_SAMPLES * squares {
+        if pixels(field) < FEW_SAMPLES * squares {
             *inflation *= (sum / correlation.sum).max(1.0);
             correlation.sum = correlation.sum.max(sum);
             correlation.sum_of_squares = correlation.sum_of_squares.max(squares);

@@ -46,9 +46,12 @@ fn of(f: &Finding) -> String {
         Some(shape) if f.status == Status::Unexplained && f.contradicted.is_none() => {
             format!(" ({shape})")
         }
-        _ => {
-            f.of_some.map_or_else(String::new, |[some, all]| format!(", in {some} of {all} views"))
-        }
+        _ => String::new(),
+    };
+    // Some shapes tell which views.
+    let which = match f.of_some {
+        Some([some, all]) if !rest.contains(" views") => format!(", in {some} of {all} views"),
+        _ => String::new(),
     };
     let size = match f.statistic {
         Statistic::Dropout => match fixed(100.0 * f.size.sigma, 1) {
@@ -82,7 +85,7 @@ fn of(f: &Finding) -> String {
         false => format!("{} % of the mismatch", fixed(100.0 * f.share, 0)),
     };
     let sizes: Vec<String> = size.into_iter().chain([share]).collect();
-    format!("{name}{rest}: {}{parameters}{halves}{next}.", sizes.join(", "))
+    format!("{name}{rest}{which}: {}{parameters}{halves}{next}.", sizes.join(", "))
 }
 
 fn settled_by(view: &NextView) -> String {

@@ -100,7 +100,8 @@ pub fn explain(recording: &Recording) -> Result<Explained> {
 
 /// Does the extended model hold an entry for it?
 fn extends(f: &Finding) -> bool {
-    matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty()
+    let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
+    keeps && f.of_some.is_none()
 }
 
 /// A finding as the truth of a set: its nats are those of one measurement, for a mean that is off by
