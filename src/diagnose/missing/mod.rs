@@ -13,6 +13,7 @@ pub mod forms;
 pub mod hard_end;
 pub mod points;
 pub mod report;
+mod round;
 mod runs;
 pub mod search;
 pub mod shapes;
@@ -20,20 +21,20 @@ pub mod shapes;
 use crate::camera::{Camera, Rays};
 use crate::diagnose::diagnosis::{Detectable, Finding};
 use crate::diagnose::edges::shadow::{Sides, band, bands_agree};
-use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
 use crate::diagnose::views::tiles::rim_px;
 use crate::rng::Seed;
-use crate::terms::{Axis, Basis, Extent};
-use cells::{Cell, LEAST, Scatter, USUAL, cells, expected, fine, patches};
+use crate::terms::{Axis, Extent};
+use cells::{Cell, LEAST, USUAL, cells, expected, fine, patches};
 use dropout_cells::DropoutCells;
 use few::few_losses;
 use hard_end::{CloseLook, HardEnd, blur};
 use points::points_of_pixels;
-use report::{DropoutReporter, NAME_ADEQUATE, detectable, rivals, shadow_finding};
-use search::{Judged, Losses, times};
+use report::{DropoutReporter, detectable, rivals, shadow_finding};
+use round::Round;
+use search::{Judged, times};
 use shapes::{Shapes, Step};
 
 /// All that was found missing.
@@ -185,29 +186,15 @@ impl DropoutSearch<'_> {
     /// What is seen in a round, by its number, and the nats that count for it. Held against a twin one view more
     /// must show it, but a hard end of the range, which the farthest may cross alone.
     fn won(&self, round: &Round<'_>, seen: &DropoutCells<'_>) -> Option<(usize, f64)> {
-        let Round { ledger, judged, .. } = round;
-        let threshold = round.threshold();
-        let mut open: Vec<usize> =
-            (0..judged.len()).take_while(|&k| judged[k].gain > threshold).collect();
         if seen.expected.is_none() {
-            return choose(judged, &open).map(|k| (k, judged[k].gain));
+            return round.won();
         }
-        let ends = |won: &Judged| {
-            let finding = self.reporter(seen, ledger.base).finding(won, &rivals([won]), 0.0);
-            self.end(&finding, ledger.base).is_some()
-        };
-        let first = choose(judged, &open)?;
-        if ends(&judged[first]) {
-            return Some((first, judged[first].gain));
-        }
-        while let Some(k) = choose(judged, &open) {
-            let counts = ledger.beyond_one_view(&judged[k]);
-            if counts > threshold {
-                return Some((k, counts));
-            }
-            open.retain(|other| *other != k);
-        }
-        None
+        let Round { ledger, judged, .. } = round;
+        let (first, gain) = round.won()?;
+        let won = &judged[first];
+        let finding = self.reporter(seen, ledger.base).finding(won, &rivals([won]), 0.0);
+        let ends = self.end(&finding, ledger.base).is_some();
+        if ends { Some((first, gain)) } else { round.won_beyond_one_view() }
     }
 
     /// Where nothing else is found: losses too few to be a share of a patch.
@@ -268,43 +255,6 @@ fn lost_everywhere(share: f64) -> Option<String> {
 
 fn touches(views: &[Vec<Cell<'_>>], end: &HardEnd) -> bool {
     views.iter().flatten().any(|c| end.touches(c))
-}
-
-/// Shapes judged with the scatter that the best of them leaves, and what noise alone brings.
-struct Round<'a> {
-    ledger: Losses<'a>,
-    judged: Vec<Judged>,
-    noise: NoiseGains,
-}
-
-impl<'a> Round<'a> {
-    fn of(
-        views: &'a [Vec<Cell<'a>>],
-        explained: &[Vec<f64>],
-        (steps, curves): (&[Step], &[Basis]),
-        least: Scatter,
-        seed: Seed,
-    ) -> Option<Self> {
-        let ledger = Losses::new(views, explained);
-        let (first, _) = ledger.judge(steps, curves, None);
-        let all: Vec<usize> = (0..first.len()).collect();
-        let ledger = ledger.scattered_as_left_by(&first[choose(&first, &all)?], least);
-        let (judged, noise) = ledger.judge(steps, curves, Some(seed));
-        Some(Round { ledger, judged, noise })
-    }
-
-    fn threshold(&self) -> f64 {
-        self.noise.threshold(LEVEL / TESTS)
-    }
-}
-
-/// Of these, best first, the best step, unless the best curve leaves it behind; by its number.
-fn choose(judged: &[Judged], among: &[usize]) -> Option<usize> {
-    let best =
-        |named: bool| among.iter().copied().find(|&k| judged[k].shape.family().is_some() == named);
-    let (step, curve) = (best(true), best(false));
-    let enough = curve.map_or(0.0, |c| NAME_ADEQUATE * judged[c].gain);
-    step.filter(|&s| judged[s].gain > enough).or(curve)
 }
 
 #[cfg(test)]

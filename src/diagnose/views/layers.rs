@@ -236,3 +236,53 @@ impl Survey {
         self.views.iter().map(|v| v.in_second_half).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::plane::Plane;
+    use crate::rng::{Seed, Stream};
+
+    /// The mean of a target of this size, its noise through boxes of `side` px.
+    fn field([width, height]: [usize; 2], side: usize, rng: &mut Stream) -> Field {
+        let wide = width + side;
+        let white: Vec<f32> =
+            (0..wide * (height + side)).map(|_| StandardNormal.sample(rng)).collect();
+        let of_box = |i: usize| {
+            let (u, v) = (i % width, i / width);
+            let rows = (v..v + side).map(|v| white[v * wide + u..][..side].iter().sum::<f32>());
+            rows.sum::<f32>() / side as f32
+        };
+        let n = width * height;
+        let plane = Plane::tilted(1.0, 0.0, 0.0);
+        Field {
+            sigma: vec![1.0; n],
+            mean: (0..n).map(of_box).collect(),
+            count: vec![1; n],
+            ..Field::unseen(plane, 40.0, [width, height], (0..n as u32).collect())
+        }
+    }
+
+    /// Of 22 x 16 px alone a box of nine looks like one of six; a view that shows its own keeps it.
+    #[test]
+    fn a_view_too_small_to_show_a_window_has_that_of_the_others() {
+        let mut rng = Seed(1).stream("layers/window");
+        let mut fields: Vec<Field> =
+            [9, 9, 9, 3].map(|side| field([160, 120], side, &mut rng)).into();
+        fields.push(field([22, 16], 9, &mut rng));
+        let alone: Vec<(f64, Correlation)> = fields.iter().map(|f| inflation(f, &[])).collect();
+        let beside = inflations(&fields, &[]);
+        assert!(alone[..4] == beside[..4]);
+        let squares =
+            |all: &[(f64, Correlation)]| all[4].1.sum_of_squares / all[0].1.sum_of_squares;
+        assert!(
+            squares(&alone) < 0.6 && squares(&beside) > 0.9,
+            "{:?}",
+            [&alone, &beside].map(|a| squares(a))
+        );
+        let more = beside[4].1.sum / alone[4].1.sum;
+        approx::assert_relative_eq!(beside[4].0, more * alone[4].0, max_relative = 1e-12);
+    }
+}

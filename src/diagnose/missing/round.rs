@@ -1,0 +1,71 @@
+//! One round of the search for losses: all shapes judged, and which of them is seen.
+
+use super::cells::{Cell, Scatter};
+use super::report::NAME_ADEQUATE;
+use super::search::{Judged, Losses};
+use super::shapes::Step;
+use super::{LEVEL, TESTS};
+use crate::diagnose::search::noise_gains::NoiseGains;
+use crate::rng::Seed;
+use crate::terms::Basis;
+
+/// Shapes judged with the scatter that the best of them leaves, and what noise alone brings.
+pub struct Round<'a> {
+    pub ledger: Losses<'a>,
+    /// Best first.
+    pub judged: Vec<Judged>,
+    pub noise: NoiseGains,
+}
+
+impl<'a> Round<'a> {
+    pub fn of(
+        views: &'a [Vec<Cell<'a>>],
+        explained: &[Vec<f64>],
+        (steps, curves): (&[Step], &[Basis]),
+        least: Scatter,
+        seed: Seed,
+    ) -> Option<Self> {
+        let ledger = Losses::new(views, explained);
+        let (first, _) = ledger.judge(steps, curves, None);
+        let all: Vec<usize> = (0..first.len()).collect();
+        let ledger = ledger.scattered_as_left_by(&first[choose(&first, &all)?], least);
+        let (judged, noise) = ledger.judge(steps, curves, Some(seed));
+        Some(Round { ledger, judged, noise })
+    }
+
+    pub fn threshold(&self) -> f64 {
+        self.noise.threshold(LEVEL / TESTS)
+    }
+
+    /// The number of what is seen, and the nats that count for it.
+    pub fn won(&self) -> Option<(usize, f64)> {
+        choose(&self.judged, &self.seen()).map(|k| (k, self.judged[k].gain))
+    }
+
+    /// The same of what is seen without any one of the views.
+    pub fn won_beyond_one_view(&self) -> Option<(usize, f64)> {
+        let mut open = self.seen();
+        while let Some(k) = choose(&self.judged, &open) {
+            let counts = self.ledger.beyond_one_view(&self.judged[k]);
+            if counts > self.threshold() {
+                return Some((k, counts));
+            }
+            open.retain(|other| *other != k);
+        }
+        None
+    }
+
+    fn seen(&self) -> Vec<usize> {
+        let threshold = self.threshold();
+        (0..self.judged.len()).take_while(|&k| self.judged[k].gain > threshold).collect()
+    }
+}
+
+/// Of these, best first, the best step, unless the best curve leaves it behind; by its number.
+fn choose(judged: &[Judged], among: &[usize]) -> Option<usize> {
+    let best =
+        |named: bool| among.iter().copied().find(|&k| judged[k].shape.family().is_some() == named);
+    let (step, curve) = (best(true), best(false));
+    let enough = curve.map_or(0.0, |c| NAME_ADEQUATE * judged[c].gain);
+    step.filter(|&s| judged[s].gain > enough).or(curve)
+}
