@@ -108,11 +108,13 @@ fn combined(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
 /// A footprint's width, the views' mean share of it and how well it explains them.
 type Footprint = (f64, (ViewMean, f64));
 
-/// The width that explains the views best.
+/// The width that explains the views best; of those that do alike, as 1 and 1.5 px, which reach one pixel,
+/// the narrowest.
 fn best(edges: &[&Edges], twins: Option<&[&Edges]>, widths: &[f64]) -> Option<Footprint> {
     let at = |w: &f64| Some((*w, mean_share(edges, twins, *w)?));
     let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > TOO_FEW_VIEWS);
-    seen.max_by(|a, b| a.1.1.total_cmp(&b.1.1))
+    const ROUNDING: f64 = 1e-9;
+    seen.reduce(|a, b| if b.1.1 - a.1.1 > ROUNDING * a.1.1.abs() { b } else { a })
 }
 
 /// Views whose edges mix while the others' do not, among so many, and the chance of it.
