@@ -92,17 +92,32 @@ pub fn mean_share(
         let (expected, as_sure) = share(twins[v], width)?;
         Some((value - expected, 1.0 / (1.0 / sure + 1.0 / as_sure)))
     };
-    combined(&(0..views.len()).filter_map(of).collect::<Vec<_>>())
+    let seen: Vec<(f64, f64)> = (0..views.len()).filter_map(of).collect();
+    let alone = by_noise(&seen)?;
+    if twins.is_none() {
+        return Some(alone);
+    }
+    Some((between_runs(&seen)?, alone.1))
 }
 
-/// Mean of (value, information) with the scatter between views, so that no view decides alone because its
-/// noise is small; and how well the mean by the noise alone explains them.
-fn combined(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
+/// Mean of (value, information), with the views' scatter where that is larger than the noise's; and how well it
+/// explains them.
+fn by_noise(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
+    let n = views.len() as f64;
+    let sure: f64 = views.iter().map(|v| v.1).sum();
+    let value = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure;
+    let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
+    let std_error = (scatter.max(1.0) / sure).sqrt();
+    let explained = value * sure.sqrt();
+    (n > 1.0 && sure > 0.0).then_some((ViewMean { value, std_error, views: n }, explained))
+}
+
+/// The same of differences between two runs, which differ view by view for no reason: with the scatter between
+/// views, so that no view decides alone because its noise is small.
+fn between_runs(views: &[(f64, f64)]) -> Option<ViewMean> {
     let units: Vec<(f64, f64)> = views.iter().map(|(v, sure)| (*v, 1.0 / sure)).collect();
     let [value, std_error] = common_value(&units)?;
-    let sure: f64 = views.iter().map(|v| v.1).sum();
-    let explained = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure.sqrt();
-    Some((ViewMean { value, std_error, views: views.len() as f64 }, explained))
+    Some(ViewMean { value, std_error, views: views.len() as f64 })
 }
 
 /// A footprint's width, the views' mean share of it and how well it explains them.
@@ -177,10 +192,10 @@ mod tests {
     fn one_view_of_little_noise_does_not_decide_alone() {
         let others = (0..9).map(|k| (0.03 * f64::from(k - 4) / 4.0, 1e4));
         let views: Vec<(f64, f64)> = others.chain([(0.03, 9e4)]).collect();
-        let (share, _) = combined(&views).unwrap();
+        let share = between_runs(&views).unwrap();
         assert!(share.p_above(0.0) > 0.05, "{share:?}");
         let agreed: Vec<(f64, f64)> = views.iter().map(|(_, sure)| (0.03, *sure)).collect();
-        let (share, _) = combined(&agreed).unwrap();
+        let share = between_runs(&agreed).unwrap();
         assert!(share.p_above(0.0) < 1e-4 && (share.value - 0.03).abs() < 1e-9, "{share:?}");
     }
 }
