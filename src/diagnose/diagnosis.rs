@@ -106,6 +106,11 @@ pub struct Finding {
     pub covariance: Covariance,
 }
 
+/// In words: so many of the views, of so many that were measured.
+pub(super) fn in_some_views([some, all]: [usize; 2]) -> String {
+    format!("in {some} of {all} views")
+}
+
 impl HeldOut {
     /// Without the views kept aside the searches find nothing, or nothing that is scored was found.
     pub fn is_nothing(&self) -> bool {
@@ -118,6 +123,11 @@ impl Finding {
     /// are few says nothing of its size.
     pub fn is_law(&self) -> bool {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
+    }
+
+    /// In how many of the views it is, in words, where not all have it.
+    pub fn which_views(&self) -> Option<String> {
+        self.of_some.map(in_some_views)
     }
 
     /// What was found of a parameter, without its error.

@@ -33,8 +33,8 @@ pub(super) fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>)
     }
 }
 
-/// A name is told once, by its strongest finding, of those in all views if there is one: the model has
-/// that.
+/// A name is told once: by the strongest finding of all views, which the model holds, or else by the
+/// strongest of some.
 pub(super) fn merge(found: &mut Vec<Finding>) {
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     let of_all: BTreeSet<&str> =

@@ -28,13 +28,11 @@ impl RandomEffects {
     /// 2007). The common value's interval is Knapp and Hartung's (2003), whose factor is one at Paule
     /// and Mandel's scatter, and is never let below one.
     pub fn of(units: &[(f64, f64)]) -> Option<Self> {
-        let [common, std_error] = common_value(units)?;
+        let (common, std_error, scatter) = pooled(units)?;
         let dof = units.len() as f64 - 1.0;
         let chi_square = ChiSquared::new(dof).ok()?;
-        let scatter = |expected: f64| scatter2(units, expected).sqrt();
         let tails = [0.5 * (1.0 + LEVEL), 0.5 * (1.0 - LEVEL)];
-        let scatter_interval = tails.map(|p| scatter(chi_square.inverse_cdf(p)));
-        let scatter = scatter(dof);
+        let scatter_interval = tails.map(|p| scatter2(units, chi_square.inverse_cdf(p)).sqrt());
         let reach = student_quantile(LEVEL, dof) * std_error;
         let common_interval = [common - reach, common + reach];
         Some(RandomEffects { common, common_interval, scatter, scatter_interval })
@@ -44,12 +42,19 @@ impl RandomEffects {
 /// The common value alone, and its standard error; the two make a Student's t with one degree of freedom
 /// less than there are units.
 pub fn common_value(units: &[(f64, f64)]) -> Option<[f64; 2]> {
+    let (common, std_error, _) = pooled(units)?;
+    Some([common, std_error])
+}
+
+/// The common value, its standard error, and the scatter between units.
+fn pooled(units: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     let usable = |(y, v): &(f64, f64)| y.is_finite() && v.is_finite() && *v > 0.0;
     if units.len() < 2 || !units.iter().all(usable) {
         return None;
     }
-    let (common, information) = mean(units, scatter2(units, units.len() as f64 - 1.0));
-    Some([common, information.sqrt().recip()])
+    let tau2 = scatter2(units, units.len() as f64 - 1.0);
+    let (common, information) = mean(units, tau2);
+    Some((common, information.sqrt().recip(), tau2.sqrt()))
 }
 
 /// The variance between units that makes Cochran's Q what is expected.

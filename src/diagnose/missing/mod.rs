@@ -183,8 +183,9 @@ impl DropoutSearch<'_> {
         outcome
     }
 
-    /// What is seen in a round, by its number, and the nats that count for it. Held against a twin one view more
-    /// must show it, but a hard end of the range, which the farthest may cross alone.
+    /// What is seen in a round, by its number, and the nats that count for it. Held against a twin it must still
+    /// be seen when any single view is left out, unless it is a hard end of the range, which the farthest view may
+    /// cross alone.
     fn won(&self, round: &Round<'_>, seen: &DropoutCells<'_>) -> Option<(usize, f64)> {
         if seen.expected.is_none() {
             return round.won();

@@ -248,8 +248,8 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
     };
     let rivals = [("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])];
     let mut finding = described(finding, family, &rivals, None);
-    let of_some = |[some, all]: [usize; 2]| format!(" Measured here: in {some} of {all} views.");
-    finding.physics += &band.of_some.map_or(String::new(), of_some);
+    let measured = finding.which_views().map(|which| format!(" Measured here: {which}."));
+    finding.physics.extend(measured);
     finding
 }
 

@@ -42,7 +42,7 @@ impl<'a> Round<'a> {
         choose(&self.judged, &self.seen()).map(|k| (k, self.judged[k].gain))
     }
 
-    /// The same of what is seen without any one of the views.
+    /// The same for the best that is still seen when any single view is left out.
     pub fn won_beyond_one_view(&self) -> Option<(usize, f64)> {
         let mut open = self.seen();
         while let Some(k) = choose(&self.judged, &open) {

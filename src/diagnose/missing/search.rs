@@ -149,7 +149,7 @@ impl<'a> Losses<'a> {
         Column { step, by_view, a }
     }
 
-    /// What it brings without the view that it can do without least. A view and its twin differ by where
+    /// Nats that are left of it without the one view that it needs most. A view and its twin differ by where
     /// their clumps of losses happen to lie: one in a corner of the steepest view is no law of the tilt.
     pub fn beyond_one_view(&self, judged: &Judged) -> f64 {
         let without: Box<dyn Fn(usize) -> f64> = match &judged.shape {
@@ -174,10 +174,13 @@ impl<'a> Losses<'a> {
     /// A step's information and score in every view.
     fn information_and_score(&self, step: Step) -> (Vec<f64>, Vec<f64>) {
         let column = self.column(step);
-        let solve = |(w, y): (&Whitener, &Vec<f64>)| w.solve(y);
-        let whitened: Vec<Vec<f64>> = self.whiteners.iter().zip(&self.left).map(solve).collect();
-        let scores = column.scores(&whitened);
+        let scores = column.scores(&self.solve(&self.left));
         (column.a, scores)
+    }
+
+    /// Every view's log odds by the inverse of their covariance.
+    fn solve(&self, y: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.whiteners.iter().zip(y).map(|(w, y)| w.solve(y)).collect()
     }
 
     /// Do both halves of the views lose by this shape?
@@ -237,10 +240,7 @@ impl<'a> Losses<'a> {
         null: Option<Seed>,
     ) -> (Vec<Judged>, NoiseGains) {
         let columns: Vec<Column> = steps.par_iter().map(|s| self.column(*s)).collect();
-        let solve = |y: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            self.whiteners.iter().zip(y).map(|(w, y)| w.solve(y)).collect()
-        };
-        let whitened = solve(&self.left);
+        let whitened = self.solve(&self.left);
         let mut judged: Vec<Judged> = columns
             .iter()
             .map(|c| {
@@ -264,7 +264,7 @@ impl<'a> Losses<'a> {
             let mut rng = seed.stream(&format!("missing/null/{replicate}"));
             let mut normal = || StandardNormal.sample(&mut rng);
             let y: Vec<Vec<f64>> = self.whiteners.iter().map(|w| w.draw(&mut normal)).collect();
-            let whitened = solve(&y);
+            let whitened = self.solve(&y);
             let gain = |c: &Column| predicted(&c.a, &c.scores(&whitened)).0 - c.step.cost();
             let steps = columns.iter().map(gain).fold(0.0, f64::max);
             nulls.iter().map(|n| n.draw(&mut rng)).fold(steps, f64::max)

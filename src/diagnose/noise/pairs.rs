@@ -183,6 +183,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::diagnose::views::box_sums::noise_through_boxes;
     use crate::rng::Seed;
 
     const WIDTH: usize = 120;
@@ -232,15 +233,8 @@ mod tests {
         const SIDE: usize = 48;
         let one = |n: u64| {
             let mut rng = Seed(n).stream("pairs/window");
-            let wide = SIDE + BOX;
-            let white: Vec<f64> =
-                (0..wide * wide).map(|_| StandardNormal.sample(&mut rng)).collect();
-            let of_box = |u: usize, v: usize| {
-                (v..v + BOX).map(|v| white[v * wide + u..][..BOX].iter().sum::<f64>()).sum::<f64>()
-            };
-            let image: Vec<f32> = (0..SIDE * SIDE)
-                .map(|i| (of_box(i % SIDE, i / SIDE) / BOX as f64) as f32)
-                .collect();
+            let noise = noise_through_boxes([SIDE, SIDE], BOX, &mut rng);
+            let image: Vec<f32> = noise.into_iter().map(|r| r as f32).collect();
             Pairs::of(&image, SIDE).unwrap()
         };
         let all: Vec<Pairs> = (0..2000).map(one).collect();

@@ -230,24 +230,20 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::diagnose::views::box_sums::noise_through_boxes;
     use crate::rng::Seed;
 
     /// An image of noise by boxes of this side beside rows that err by about so much of the variance, and
     /// their share as it turned out.
     fn image(side: usize, share: f64) -> (Vec<f32>, f64) {
         let mut rng = Seed(7).stream("texture/area");
+        let noise = noise_through_boxes([WIDTH, HEIGHT], side, &mut rng);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let wide = WIDTH + side;
-        let white: Vec<f64> = (0..wide * (HEIGHT + side)).map(|_| normal()).collect();
-        let at = |i: usize| {
-            let (u, v) = (i % WIDTH, i / WIDTH);
-            let rows = (v..v + side).map(|v| white[v * wide + u..][..side].iter().sum::<f64>());
-            rows.sum::<f64>() / side as f64
-        };
         let scale = (share / (1.0 - share)).sqrt();
         let rows: Vec<f64> = (0..HEIGHT).map(|_| scale * normal()).collect();
         let square = rows.iter().map(|r| r * r).sum::<f64>() / HEIGHT as f64;
-        let image = (0..WIDTH * HEIGHT).map(|i| (at(i) + rows[i / WIDTH]) as f32).collect();
+        let with_row = |(i, r): (usize, f64)| (r + rows[i / WIDTH]) as f32;
+        let image = noise.into_iter().enumerate().map(with_row).collect();
         (image, square / (1.0 + square))
     }
 

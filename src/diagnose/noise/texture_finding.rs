@@ -3,6 +3,7 @@
 use serde_json::Map;
 
 use super::view_mean::{ViewMean, nats};
+use crate::diagnose::diagnosis::in_some_views;
 use crate::diagnose::finding::parameters::one;
 use crate::terms::{Axis, Statistic};
 
@@ -28,7 +29,7 @@ pub struct TextureFinding {
 impl TextureFinding {
     /// What these views showed when they were taken for all, of so many that were measured.
     pub fn of_some(self, [shown, of]: [usize; 2], p: f64) -> Self {
-        let which = format!("in {shown} of {of} views");
+        let which = in_some_views([shown, of]);
         let words = Some(self.words.map_or(which.clone(), |words| format!("{words}, {which}")));
         TextureFinding { words, of_some: Some([shown, of]), p, ..self }
     }

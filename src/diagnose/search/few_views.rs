@@ -170,13 +170,13 @@ pub fn few_views(
     Some(report(scene, told, &names, noise.p(told.1.gain)))
 }
 
-/// More names than these are none.
+/// Where more names than these explain it none is told.
 const MAX_NAMES: usize = 3;
 
 /// Of the candidates, best first, the one to report, and the names it may have, none for a curve. In a few views
 /// much looks alike: a name must be better than what has none on another axis, and by far than what has none in all
-/// views, `nameless`: this one's misfit in some of them looks like anything. What one view's level of noise is, any
-/// cause of the catalogue explains.
+/// views, `nameless`: this one's misfit in some of them looks like anything. The level of one view's noise fits
+/// every cause that changes the noise.
 fn told<'a>(
     all: &'a [(&'a Candidate, Best)],
     nameless: f64,

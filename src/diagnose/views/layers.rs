@@ -239,27 +239,19 @@ impl Survey {
 
 #[cfg(test)]
 mod tests {
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
+    use crate::diagnose::views::box_sums::noise_through_boxes;
     use crate::plane::Plane;
     use crate::rng::{Seed, Stream};
 
     /// The mean of a target of this size, its noise through boxes of `side` px.
     fn field([width, height]: [usize; 2], side: usize, rng: &mut Stream) -> Field {
-        let wide = width + side;
-        let white: Vec<f32> =
-            (0..wide * (height + side)).map(|_| StandardNormal.sample(rng)).collect();
-        let of_box = |i: usize| {
-            let (u, v) = (i % width, i / width);
-            let rows = (v..v + side).map(|v| white[v * wide + u..][..side].iter().sum::<f32>());
-            rows.sum::<f32>() / side as f32
-        };
+        let noise = noise_through_boxes([width, height], side, rng);
         let n = width * height;
         let plane = Plane::tilted(1.0, 0.0, 0.0);
         Field {
             sigma: vec![1.0; n],
-            mean: (0..n).map(of_box).collect(),
+            mean: noise.into_iter().map(|r| r as f32).collect(),
             count: vec![1; n],
             ..Field::unseen(plane, 40.0, [width, height], (0..n as u32).collect())
         }

@@ -49,10 +49,8 @@ fn of(f: &Finding) -> String {
         _ => String::new(),
     };
     // Some shapes tell which views.
-    let which = match f.of_some {
-        Some([some, all]) if !rest.contains(" views") => format!(", in {some} of {all} views"),
-        _ => String::new(),
-    };
+    let which = f.which_views().filter(|_| !rest.contains(" views"));
+    let which = which.map_or_else(String::new, |which| format!(", {which}"));
     let size = match f.statistic {
         Statistic::Dropout => match fixed(100.0 * f.size.sigma, 1) {
             few if few == "0.0" => Some("less than 0.1 % of the pixels lost".to_string()),
