@@ -5,7 +5,7 @@ use super::case::Case;
 use super::checks::far_off::far_off;
 use super::checks::rms;
 use super::diagnosis::{
-    After, DIAGNOSIS_FORMAT, Diagnosis, Finding, HeldOut, MapRow, Reference, ViewLine,
+    After, DIAGNOSIS_FORMAT, Diagnosis, Finding, HeldOut, MapRow, Reference, Verdict, ViewLine,
 };
 use super::distance::laws;
 use super::distance::reference;
@@ -58,11 +58,12 @@ impl Case<'_> {
         let scenes = self.scenes();
         self.advise(&mut found, &scenes, outcomes, ends);
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
-        let tested = (found.is_empty() && refitted.is_none()).then(|| verdict(&found, outcomes));
+        let tested =
+            (found.is_empty() && refitted.is_none()).then(|| self.verdict(&found, outcomes));
         if found.is_empty() {
             found.extend(far_off(&self.survey, typical_sigma_mm(&self.fields)));
         }
-        let verdict = verdict(&found, outcomes);
+        let verdict = self.verdict(&found, outcomes);
         let cannot_tell = reference::cannot_tell(&self.fields, self.sensor().kind);
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
@@ -75,7 +76,11 @@ impl Case<'_> {
         );
         drop(scenes);
         detectable.extend(detectable_losses);
-        let mut remarks = self.remarks();
+        let mut remarks = Vec::new();
+        if verdict != Verdict::Mismatch {
+            remarks.extend(self.few_are_left());
+        }
+        remarks.append(&mut self.remarks());
         remarks.extend(untested(outcomes, self.survey.block_tiles));
         remarks.extend(better_form);
         let told = found.iter().chain(&refitted);
@@ -121,6 +126,25 @@ impl Case<'_> {
             taken_out,
             bias_px: mean.px,
         }
+    }
+
+    /// Views that were left out are no match: where they are more than the others, nothing found in those
+    /// says nothing of the recording.
+    fn verdict(&self, found: &[Finding], outcomes: [&Outcome; 2]) -> Verdict {
+        match verdict(found, outcomes) {
+            Verdict::Match if self.few_are_left().is_some() => Verdict::Inconclusive,
+            verdict => verdict,
+        }
+    }
+
+    fn few_are_left(&self) -> Option<String> {
+        let (left_out, kept) = (self.excluded.len(), self.fields.len());
+        (left_out > kept).then(|| {
+            format!(
+                "{left_out} of {} views were left out: the others do not stand for the recording",
+                left_out + kept
+            )
+        })
     }
 
     /// The views that would settle names that are in doubt, where depth comes back: not beyond these `ends`,

@@ -3,9 +3,11 @@
 
 use std::fs;
 
+use kinoise::Frame;
 use kinoise::io::FrameSource;
 use serde_json::{Value, json};
 
+use crate::common::write_depth;
 use crate::desk::{Desk, fifo};
 
 /// A newline in the sensor's name wrote a line that looked like the program's own.
@@ -151,6 +153,26 @@ fn a_model_that_is_far_off_is_no_inconclusive_answer() {
         let findings = diagnosis["findings"].as_array().expect("findings");
         let told_bias = |f: &Value| f["statistic"] == "bias" && f["status"] != "not-identifiable";
         assert!(findings.iter().any(told_bias), "{views} {k_px}: {told}");
+    }
+}
+
+/// "match" was said of twelve views of which nine were left out.
+#[test]
+fn of_a_recording_that_is_mostly_left_out_nothing_is_said() {
+    let desk = Desk::new();
+    desk.model("model.json", |_| ());
+    let nothing = Frame { width: 160, height: 120, raw: vec![0; 160 * 120] };
+    for (left_out, verdict) in [(6, "match"), (7, "inconclusive")] {
+        for (view, frame) in (0..left_out).flat_map(|view| [(view, 0), (view, 1)]) {
+            write_depth(&desk.at(&format!("rec/{view:04}/depth/{frame:04}.png")), &nothing);
+        }
+        let told = desk.done("diagnose rec -m model.json -o out --force");
+        assert!(told.contains(&format!("{verdict}: nothing was found")), "{left_out}: {told}");
+        let file = fs::read_to_string(desk.at("out/diagnosis.json")).expect("text");
+        let diagnosis: Value = serde_json::from_str(&file).expect("JSON");
+        assert_eq!(diagnosis["verdict"], verdict, "{left_out}: {told}");
+        let says = format!("{left_out} of 12 views were left out");
+        assert_eq!(told.contains(&says), verdict == "inconclusive", "{told}");
     }
 }
 
