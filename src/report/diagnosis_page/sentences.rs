@@ -26,8 +26,9 @@ pub(super) fn description(id: &'static str) -> &'static str {
 /// The answer in a sentence or two.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
     let effects = missing(&diagnosis.findings);
-    let names: Vec<String> = effects.iter().take(MAX_NAMES).map(|f| called(f)).collect();
-    let names = join(&names, "and");
+    let name = |f: &&Finding| [Some(called(f)), f.which_views()].into_iter().flatten();
+    let names = effects.iter().take(MAX_NAMES).map(|f| name(f).collect::<Vec<_>>().join(" "));
+    let names = join(&names.collect::<Vec<_>>(), "and");
     let contradicted: Vec<String> =
         diagnosis.findings.iter().filter_map(|f| f.contradicted.map(against)).collect();
     let recalibrate = diagnosis.findings.iter().any(|f| f.status == Status::Recalibrate);

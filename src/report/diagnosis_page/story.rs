@@ -48,8 +48,8 @@ fn of(f: &Finding) -> String {
         }
         _ => String::new(),
     };
-    // Some shapes tell which views.
-    let which = f.which_views().filter(|_| !rest.contains(" views"));
+    // The shape of what some views have tells which.
+    let which = f.which_views().filter(|_| rest.is_empty());
     let which = which.map_or_else(String::new, |which| format!(", {which}"));
     let size = match f.statistic {
         Statistic::Dropout => match fixed(100.0 * f.size.sigma, 1) {

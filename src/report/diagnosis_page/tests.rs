@@ -296,12 +296,16 @@ fn odd_numbers_do_not_break_a_page() {
 /// With a name and without, once.
 #[test]
 fn what_some_views_have_is_told_of_those() {
-    let some = |f: Finding| {
+    let of = |f: Finding| {
         let f = Finding { of_some: Some([5, 20]), ..f };
-        story(&diagnosis(Verdict::Mismatch, vec![f])).remove(0)
+        diagnosis(Verdict::Mismatch, vec![f])
     };
-    let told = some(finding(Status::Named, Some("row-noise")));
+    let some = |f: Finding| story(&of(f)).remove(0);
+    let rows = || finding(Status::Named, Some("row-noise"));
+    let told = some(rows());
     assert!(told.contains(", in 5 of 20 views: "), "{told}");
+    let told = sentences::verdict(&of(rows()));
+    assert!(told.ends_with("row noise in 5 of 20 views."), "{told}");
     let shape = Some("in 5 of 20 views".to_string());
     let told = some(Finding { shape, ..finding(Status::Unexplained, None) });
     assert_eq!(told.matches("in 5 of 20 views").count(), 1, "{told}");
