@@ -52,14 +52,9 @@ impl Effect for SpatialCorrelation {
 /// Mean over a square window of `side` px (a fraction weighs the outermost pixels), the variance
 /// kept. The image is taken as wrapped, so that the border is like the middle.
 fn window_mean(field: &mut [f32], width: usize, side: f64) {
-    let window = Window::of(side);
-    let mut line = Vec::with_capacity(width);
-    for row in field.chunks_exact_mut(width) {
-        line.clear();
-        line.extend_from_slice(row);
-        window.along_row(&line, row);
-    }
-    window.along_columns(field, width);
+    let (window, pixels) = (Window::of(side), field.len());
+    (0..pixels).step_by(width).for_each(|row| window.along(field, row..row + width));
+    (0..width).for_each(|column| window.along(field, (column..pixels).step_by(width)));
 }
 
 /// The weights of a moving mean: one, but `edge` at both ends.
@@ -79,48 +74,17 @@ impl Window {
         Window { reach: reach as usize, edge, norm: 1.0 / squares.sqrt() }
     }
 
-    /// A running sum: a pixel comes in, a pixel goes out, whatever the window's side.
-    fn along_row(&self, line: &[f32], out: &mut [f32]) {
-        let at = |i: isize| f64::from(line[i.rem_euclid(line.len() as isize) as usize]);
-        let reach = self.reach as isize;
-        let mut inner: f64 = (1 - reach..reach).map(at).sum();
-        let mut put = |i: usize, left: f64, right: f64, next_out: f64| {
-            out[i] = ((inner + self.edge * (left + right)) * self.norm) as f32;
-            inner += right - next_out;
-        };
-        for i in 0..line.len() {
-            let middle = i as isize;
-            let (first, last) = (i.wrapping_sub(self.reach), i + self.reach);
-            if first < line.len() && last < line.len() {
-                let [left, next, right] = [first, first + 1, last].map(|k| f64::from(line[k]));
-                put(i, left, right, next);
-            } else {
-                put(i, at(middle - reach), at(middle + reach), at(middle - reach + 1));
-            }
-        }
-    }
-
-    /// The same down all columns at once, a row after another, as memory lies.
-    fn along_columns(&self, field: &mut [f32], width: usize) {
-        let source = field.to_vec();
-        let height = source.len() / width;
-        let row = |v: isize| {
-            let v = v.rem_euclid(height as isize) as usize;
-            &source[v * width..(v + 1) * width]
-        };
-        let reach = self.reach as isize;
-        let mut inner = vec![0f64; width];
-        for v in 1 - reach..reach {
-            inner.iter_mut().zip(row(v)).for_each(|(sum, x)| *sum += f64::from(*x));
-        }
-        for (v, out) in field.chunks_exact_mut(width).enumerate() {
-            let v = v as isize;
-            let (top, next, bottom) = (row(v - reach), row(v - reach + 1), row(v + reach));
-            for u in 0..width {
-                let [top, next, bottom] = [top[u], next[u], bottom[u]].map(f64::from);
-                out[u] = ((inner[u] + self.edge * (top + bottom)) * self.norm) as f32;
-                inner[u] += bottom - next;
-            }
+    /// A running sum over a line of pixels: one comes in, one goes out, whatever the window's side.
+    fn along(&self, field: &mut [f32], line: impl Iterator<Item = usize>) {
+        let line: Vec<usize> = line.collect();
+        let wrapped = |i: usize| (i as isize - self.reach as isize).rem_euclid(line.len() as isize);
+        let pixel = |i: usize| f64::from(field[line[wrapped(i) as usize]]);
+        let wide: Vec<f64> = (0..line.len() + 2 * self.reach).map(pixel).collect();
+        let mut inner: f64 = wide[1..2 * self.reach].iter().sum();
+        for (i, &pixel) in line.iter().enumerate() {
+            let (first, last) = (wide[i], wide[i + 2 * self.reach]);
+            field[pixel] = ((inner + self.edge * (first + last)) * self.norm) as f32;
+            inner += last - wide[i + 1];
         }
     }
 }
