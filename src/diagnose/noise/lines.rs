@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::texture::{PIXEL_BOX, pixel_scale};
+use super::texture::{PIXEL_BOX, line_sums, pixel_scale};
 use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::box_sums::{SMOOTH_PX, over_boxes};
@@ -12,9 +12,6 @@ use crate::terms::{Axis, Basis, Coordinate, Modulation, Term};
 
 /// Columns and rows of fewer readings over all views are left at nothing.
 const FEWEST_READINGS: f64 = 200.0;
-
-/// What a line's readings sum to in one view, and how many they are.
-type Sums = Vec<(f64, f64)>;
 
 /// What each column, or each row, errs by.
 #[derive(Debug, Clone)]
@@ -34,16 +31,10 @@ impl LearntLines {
             Axis::Row => (Coordinate::Row, height),
             _ => (Coordinate::Column, width),
         };
-        let by_view: Vec<Sums> = views
+        let by_view: Vec<Vec<(f64, f64)>> = views
             .par_iter()
             .map(|(field, bias)| {
-                let mut sums: Sums = vec![(0.0, 0.0); nodes];
-                let image = pixel_scale(field, &field.mean, bias);
-                for (i, &r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
-                    let line = if axis == Axis::Row { i / width } else { i % width };
-                    sums[line].0 += f64::from(r);
-                    sums[line].1 += 1.0;
-                }
+                let sums = line_sums(&pixel_scale(field, &field.mean, bias), width, axis);
                 // View by view, so that the scatter of the views is that of what is told.
                 let means: Vec<f32> = sums.iter().map(|(sum, n)| (sum / n) as f32).collect();
                 let own = with_own_share(&means).into_iter().map(f64::from).zip(sums);

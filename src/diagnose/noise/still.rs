@@ -3,9 +3,10 @@
 use rand::Rng;
 use rayon::prelude::*;
 
-use super::texture::{SHORT_LINE, at_two_scales, without_lines};
+use super::texture::{SHORT_LINE, at_two_scales, line_sums, without_lines};
 use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
+use crate::terms::Axis;
 
 /// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share;
 /// of means over a few pixels, the same; of whole columns and of whole rows, as far as they change from one to the
@@ -61,7 +62,7 @@ fn covariances(
 ) -> Vec<Still> {
     let of_view = |(f, b): &(&Field, &[f32])| {
         let images = images(f, b);
-        let (columns, rows) = sharp_lines(&images[0], f.width);
+        let [columns, rows] = sharp_lines(&images[0], f.width);
         let [pixels, blotches] = images.map(|m| without_lines(&m, f.width, SHORT_LINE));
         [pixels, blotches, columns, rows]
     };
@@ -85,20 +86,13 @@ const FEWEST_PAIRS: [f64; 2] = [1000.0, 100.0];
 /// What the mean of each column, and of each row, has beyond the mean of its neighbours'; NaN where one of
 /// them is short. What is smooth, as leftovers of shapes are, is not in it; lines that err independently
 /// keep their variance.
-fn sharp_lines(image: &[f32], width: usize) -> (Vec<f32>, Vec<f32>) {
-    let height = image.len() / width.max(1);
-    let mut sums = vec![(0.0, 0usize); width + height];
-    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
-        for line in [i % width, width + i / width] {
-            sums[line].0 += f64::from(*r);
-            sums[line].1 += 1;
-        }
-    }
-    let mean = |(sum, n): &(f64, usize)| if *n >= SHORT_LINE { sum / *n as f64 } else { f64::NAN };
-    let means: Vec<f64> = sums.iter().map(mean).collect();
-    let (columns, rows) = means.split_at(width);
+fn sharp_lines(image: &[f32], width: usize) -> [Vec<f32>; 2] {
+    let mean = |(sum, n): (f64, f64)| if n >= SHORT_LINE { sum / n } else { f64::NAN };
     let sharp = |w: &[f64]| ((w[1] - 0.5 * (w[0] + w[2])) * (2.0f64 / 3.0).sqrt()) as f32;
-    (columns.windows(3).map(sharp).collect(), rows.windows(3).map(sharp).collect())
+    [Axis::Column, Axis::Row].map(|axis| {
+        let means: Vec<f64> = line_sums(image, width, axis).into_iter().map(mean).collect();
+        means.windows(3).map(sharp).collect()
+    })
 }
 
 /// Heads or tails for each pixel of the picture: a pattern whose variance is 1 wherever it is seen.

@@ -8,6 +8,7 @@ use crate::diagnose::options::FRAMES_KEPT;
 use crate::diagnose::views::box_sums::{gross_limit, high_pass};
 use crate::diagnose::views::field::Field;
 use crate::stats::measure_correlation;
+use crate::terms::Axis;
 
 /// Frames that resemble one another more than this have little noise of their own.
 const STILL: f64 = 0.6;
@@ -80,33 +81,35 @@ pub fn without_outliers(image: &[f32]) -> Vec<f32> {
 }
 
 /// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
-const LONG_LINE: usize = 150;
+const LONG_LINE: f64 = 150.0;
 /// The same where a pixel is held against itself, and a line's mean only stands in the way.
-pub const SHORT_LINE: usize = 30;
+pub const SHORT_LINE: f64 = 30.0;
+
+/// The row, or the column, of an image's pixel.
+pub fn line_of(pixel: usize, width: usize, axis: Axis) -> usize {
+    if axis == Axis::Row { pixel / width } else { pixel % width }
+}
+
+/// Of each row, or each column, the sum and the number of its pixels.
+pub fn line_sums(image: &[f32], width: usize, axis: Axis) -> Vec<(f64, f64)> {
+    let lines = if axis == Axis::Row { image.len() / width.max(1) } else { width };
+    let mut sums = vec![(0.0, 0.0); lines];
+    for (i, r) in image.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+        let (sum, n) = &mut sums[line_of(i, width, axis)];
+        *sum += f64::from(*r);
+        *n += 1.0;
+    }
+    sums
+}
 
 /// Minus the mean of each long row and column: noise that a row shares is no window's.
-pub fn without_lines(image: &[f32], width: usize, least: usize) -> Vec<f32> {
+pub fn without_lines(image: &[f32], width: usize, least: f64) -> Vec<f32> {
     let mut out = image.to_vec();
-    let level = |sum: f64, n: usize| if n >= least { (sum / n as f64) as f32 } else { 0.0 };
-    let mut columns = vec![(0.0, 0); width];
-    for row in out.chunks_exact_mut(width.max(1)) {
-        let (mut sum, mut n) = (0.0, 0);
-        for r in row.iter().filter(|r| r.is_finite()) {
-            sum += f64::from(*r);
-            n += 1;
-        }
-        let mean = level(sum, n);
-        for (r, (sum, n)) in row.iter_mut().zip(&mut columns) {
-            *r -= mean;
-            if r.is_finite() {
-                *sum += f64::from(*r);
-                *n += 1;
-            }
-        }
-    }
-    let means: Vec<f32> = columns.into_iter().map(|(sum, n)| level(sum, n)).collect();
-    for row in out.chunks_exact_mut(width.max(1)) {
-        row.iter_mut().zip(&means).for_each(|(r, mean)| *r -= mean);
+    let level = |(sum, n): (f64, f64)| if n >= least { (sum / n) as f32 } else { 0.0 };
+    for axis in [Axis::Row, Axis::Column] {
+        let levels: Vec<f32> = line_sums(&out, width, axis).into_iter().map(level).collect();
+        let pixels = out.iter_mut().enumerate();
+        pixels.for_each(|(i, r)| *r -= levels[line_of(i, width, axis)]);
     }
     out
 }
