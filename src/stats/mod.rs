@@ -109,6 +109,11 @@ pub fn student_coverage(k: f64, degrees_of_freedom: Option<f64>) -> f64 {
     1.0 - 2.0 * beyond
 }
 
+/// P(T > t) of Student's t; 1 without a degree of freedom.
+pub fn student_upper(t: f64, degrees_of_freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.0, |law| law.sf(t))
+}
+
 /// Variance of a standard normal kept only within +-`cut`: below one, tends to one.
 ///
 /// 1 - 2 k phi(k) / (2 Phi(k) - 1) (Johnson, Kotz and Balakrishnan 1994, section 13.10).

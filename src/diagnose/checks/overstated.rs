@@ -3,8 +3,6 @@
 //! What is known is taken out before anything is looked for, so that too much of it would pass: each
 //! is held against the views by what it would do to them. The views are the sample.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::textures::beyond;
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::{Finding, Size};
@@ -41,15 +39,6 @@ pub struct Claim {
     pub size_sigma: f64,
 }
 
-impl Claim {
-    /// Chance that views of a sensor which has half of it show as little.
-    fn p(&self) -> f64 {
-        let off = (self.seen.value - self.half) / self.seen.std_error.max(f64::MIN_POSITIVE);
-        let t = StudentsT::new(0.0, 1.0, self.seen.views - 1.0);
-        t.map_or(1.0, |t| t.cdf(off)).max(1e-300)
-    }
-}
-
 impl Case<'_> {
     /// What the model has more than twice of.
     pub(in crate::diagnose) fn overstated(&self, scatter: &ScatterResult) -> Vec<Finding> {
@@ -63,7 +52,8 @@ impl Case<'_> {
         let claims = claims.into_iter().chain(self.tails_claimed(&scatter.structure));
         let claims = claims.chain(self.edges_claimed()).chain(self.losses_claimed());
         let told = |c: Claim| {
-            let p = c.p();
+            // Chance that views of a sensor which has half of it show as little.
+            let p = c.seen.p_below(c.half);
             let size = Size { mm: c.size_sigma * sigma_mm, sigma: c.size_sigma };
             let finding = finding(&self.known, c.id, c.statistic, c.axis);
             let share = nats(&c.seen, c.half);

@@ -3,8 +3,6 @@
 //! The band that the projector cannot light is as many pixels wide as the disparity falls from the
 //! target's edge to what is behind: fx b (1/z - 1/z_behind), on the side away from the projector.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::{EdgeLoss, Edges};
 use crate::diagnose::checks::replication::agree;
 use crate::diagnose::diagnosis::Curve;
@@ -128,9 +126,8 @@ fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
     let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
-    let student = StudentsT::new(0.0, 1.0, lawful.views - 1.0).ok()?;
     // Two sides were looked at.
-    let p = (2.0 * student.sf(t(&lawful))).min(1.0);
+    let p = (2.0 * lawful.p_above(0.0)).min(1.0);
     let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
     let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
     Some(Band {

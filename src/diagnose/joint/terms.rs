@@ -1,13 +1,13 @@
 //! Which terms the joint fit keeps, and whether it has a smooth rest: by what views left out say.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::fit::{Joint, Reduced, SMOOTHNESS};
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::choose::behind;
 use crate::diagnose::search::outcome::Chosen;
 use crate::diagnose::views::samples::COARSE_PX;
+use crate::stats::student_upper;
 use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 
 /// Maps take the place of terms where they predict views left out better by this share, and by so
@@ -89,7 +89,8 @@ impl Joint<'_> {
                 settled = mapped;
                 self.drop_idle(&mut settled, chosen, total(&alone));
                 settled.maps = total(&settled.scores) - total(&alone);
-                settled.maps_p = chance(behind(&settled.scores, &alone), alone.len());
+                let freedom = alone.len().saturating_sub(1).max(1) as f64;
+                settled.maps_p = student_upper(behind(&settled.scores, &alone), freedom);
             }
         }
         if settled.penalty.is_none() {
@@ -243,12 +244,6 @@ fn without(terms: &[usize], term: usize) -> Vec<usize> {
 /// Needless is a term without which the parts left out lose less than this share.
 fn brings_less_than(share: f64) -> impl Fn(&Settled, usize, f64, &[f64]) -> bool {
     move |settled, _, lost, _| lost < share * total(&settled.scores)
-}
-
-/// Of a mean over its standard error this large, over so many parts.
-fn chance(t: f64, parts: usize) -> f64 {
-    let law = StudentsT::new(0.0, 1.0, parts.saturating_sub(1).max(1) as f64);
-    law.map_or(1.0, |law| law.sf(t))
 }
 
 pub fn total(scores: &[f64]) -> f64 {

@@ -1,10 +1,10 @@
 //! Statistics that some of the views have and the others have not: of those a mean over all tells little.
 
-use statrs::distribution::{Chi, Continuous, ContinuousCDF, StudentsT};
+use statrs::distribution::{Chi, Continuous};
 
 use super::structure::Structure;
 use super::view_mean::Weight;
-use crate::stats::{at_least, normal_beyond};
+use crate::stats::{at_least, normal_beyond, student_upper};
 
 /// Fewer views than this, and than this share of all, are odd ones.
 const FEWEST: usize = 3;
@@ -42,8 +42,8 @@ impl SomeViews {
         which.sort_by(|a, b| off[*b].total_cmp(&off[*a]));
         let (least, n) = (fewest(off.len()), which.len());
         let p = order_statistic(off[*which.get(least - 1)?] / scale, least, n, freedom);
-        let student = StudentsT::new(0.0, 1.0, freedom as f64).ok()?;
-        let clear = which.iter().filter(|v| student.sf(off[**v] / scale) < CLEAR).count();
+        let sure = |v: &&usize| student_upper(off[**v] / scale, freedom as f64) < CLEAR;
+        let clear = which.iter().filter(sure).count();
         which.truncate(clear.max(least));
         which.sort_unstable();
         Some(SomeViews { which, p })

@@ -1,10 +1,8 @@
 //! The mean of a statistic over the views, which no single view moves far.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::structure::Structure;
 use crate::diagnose::search::null::student;
-use crate::stats::{MAD_TO_SIGMA, mean, median};
+use crate::stats::{MAD_TO_SIGMA, mean, median, student_upper};
 
 /// Mean of a statistic over the views, and its standard error.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +61,7 @@ impl ViewMean {
     /// Chance of a mean this far above `expected`, one-sided, by Student's t.
     pub fn p_above(&self, expected: f64) -> f64 {
         let t = (self.value - expected) / self.std_error.max(1e-12 * self.value.abs()).max(1e-300);
-        StudentsT::new(0.0, 1.0, self.views - 1.0).map_or(1.0, |d| d.sf(t)).max(1e-300)
+        student_upper(t, self.views - 1.0).max(1e-300)
     }
 
     /// The same below it.
