@@ -91,7 +91,7 @@ fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfV
         (None, Axis::Residual, _) => Box::new(|s| Some(s.skewness()?[0])),
         (None, Axis::Pixel, _) => Box::new(|s| s.blotches_px2),
         (None, Axis::Column, _) => Box::new(|s| s.column_px2),
-        (None, Axis::Frame, Statistic::Correlation) => Box::new(|s| Some(s.tilts?.beyond_px2())),
+        (None, Axis::Frame, Statistic::Correlation) => Box::new(|s| Some(s.tilts?.beyond())),
         (None, Axis::Frame, _) => {
             let frame = found.parameters.get("frame")?.as_u64()? as usize;
             Box::new(move |s| *s.frame_log_variance.get(frame)?)

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::frame_series::{Excess, Jitter};
+use super::frame_series::{Excess, Jitter, Squares};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
@@ -171,20 +171,18 @@ fn jitter(
     variance_px2: f64,
     level: f64,
 ) -> Option<TextureFinding> {
-    let beside = |j: &Jitter| j.scatter_px2 / (j.expected_px2 + known_px2).max(1e-300);
-    let Excess { p, nats } = Excess::of(all.iter().map(beside).sum(), noise.freedom);
-    let jitter_px2 = noise.extra_px2;
-    if !(p < level && jitter_px2 > 0.0) {
-        return None;
-    }
-    let sigma = jitter_px2.sqrt();
+    let beside = all.iter().map(|j| Squares {
+        sum: j.scatter_px2,
+        freedom: j.freedom,
+        expected: j.expected_px2 + known_px2,
+    });
+    let Excess { p, nats, .. } = Excess::of(beside, level)?;
+    // All of it, as a model has it.
+    let sigma = noise.extra_px2.sqrt();
+    let error = UNEVEN.hypot(1.0 / (2.0 * noise.freedom).sqrt());
     Some(TextureFinding {
-        parameters: one(
-            "sigma_px",
-            sigma,
-            sigma * UNEVEN.hypot(1.0 / (2.0 * noise.freedom).sqrt()),
-        ),
-        size_sigma: (jitter_px2 / variance_px2.max(1e-12)).sqrt(),
+        parameters: one("sigma_px", sigma, sigma * error),
+        size_sigma: (noise.extra_px2 / variance_px2.max(1e-12)).sqrt(),
         p,
         nats,
         ..TextureFinding::named(vec![JITTERS], Statistic::Correlation, Axis::Frame)

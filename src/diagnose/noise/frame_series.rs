@@ -3,25 +3,55 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::diagnose::views::field::{CLIP_SIGMAS, Field};
+use crate::solve::plane_equations;
 
 /// Frames scatter by this factor more before it is told: what pixels share beyond a window's reach is not in their
 /// noise, and heavy tails double what the size of it scatters by.
 const MUCH: f64 = 2.0;
 
-/// Squares that scatter by more than their noise, as so many times what is expected of their degrees of freedom.
+/// Squares that values of one view scatter by.
+#[derive(Debug, Clone, Copy)]
+pub struct Squares {
+    pub sum: f64,
+    pub freedom: f64,
+    /// What noise lets one expect for the sum over the freedom.
+    pub expected: f64,
+}
+
+impl Squares {
+    /// Per degree of freedom, beyond what is expected.
+    pub fn beyond(&self) -> f64 {
+        self.sum / self.freedom - self.expected
+    }
+}
+
+/// Values that scatter by more than their noise.
 pub struct Excess {
+    /// Standard deviation beside the noise, and its standard error.
+    pub size: f64,
+    pub std_error: f64,
     /// Chance of it for noise twice as large as is known.
     pub p: f64,
     pub nats: f64,
 }
 
 impl Excess {
-    pub fn of(ratio: f64, freedom: f64) -> Self {
-        let larger = ratio / freedom;
-        Excess {
-            p: ChiSquared::new(freedom).map_or(1.0, |d| d.sf(ratio / MUCH)).max(1e-300),
-            nats: 0.5 * freedom * (larger - 1.0 - larger.ln()),
+    /// Of all views together, at this level.
+    pub fn of(views: impl Iterator<Item = Squares>, level: f64) -> Option<Self> {
+        let (mut ratio, mut freedom, mut beyond) = (0.0, 0.0, 0.0);
+        for s in views {
+            ratio += s.sum / s.expected;
+            freedom += s.freedom;
+            beyond += s.sum - s.freedom * s.expected;
         }
+        let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(ratio / MUCH)).max(1e-300);
+        let (size, larger) = ((beyond / freedom).sqrt(), ratio / freedom);
+        (p < level && beyond > 0.0).then(|| Excess {
+            size,
+            std_error: size / (2.0 * freedom).sqrt(),
+            p,
+            nats: 0.5 * freedom * (larger - 1.0 - larger.ln()),
+        })
     }
 }
 
@@ -86,21 +116,14 @@ impl Jitter {
     }
 }
 
-/// How the slopes of a view's frames scatter about a line in time, along both axes of the picture together.
-#[derive(Debug, Clone, Copy)]
-pub struct TiltScatter {
-    /// Sum of squares, px^2 at one standard deviation of the target's pixels from its middle.
-    pub sum_px2: f64,
-    pub freedom: f64,
-    /// What the pixels' own noise lets one expect for the sum over the freedom, px^2.
-    pub expected_px2: f64,
-}
-
-impl TiltScatter {
+impl Squares {
+    /// How the slopes of a view's frames scatter about a line in time, along both axes of the picture together: px^2
+    /// at one standard deviation of the target's pixels from its middle.
+    ///
     /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three, of
     /// which those that lost many pixels are none. Where the noise is larger far from the middle, as on a tilted
     /// target, slopes err by more.
-    pub fn of(field: &Field, mean_px2: f64) -> Option<Self> {
+    pub fn of_slopes(field: &Field, mean_px2: f64) -> Option<Self> {
         let axes = axes(field)?;
         let slopes = field.first.iter().map(|r| slopes(field, r, &axes));
         let whole = |n: f64| n >= MIN_SHARE * field.measured_pixels();
@@ -112,18 +135,13 @@ impl TiltScatter {
             let series: Vec<(f64, f64)> = frames.iter().map(|(t, s)| (*t, s[axis])).collect();
             AboutLine::of(&series).map(|line| line.scatter)
         };
-        let sum_px2 = of_axis(0)? + of_axis(1)?;
+        let sum = of_axis(0)? + of_axis(1)?;
         let freedom = 2.0 * (frames.len() as f64 - 2.0);
         let noise = || field.sigma.iter().map(|s| f64::from(*s).powi(2));
         let apart = axes.iter().zip(noise()).map(|([u, v], px2)| 0.5 * (u * u + v * v) * px2);
         let lever = apart.sum::<f64>() / noise().sum::<f64>();
-        let expected_px2 = lever * mean_px2;
-        (expected_px2 > 0.0).then_some(TiltScatter { sum_px2, freedom, expected_px2 })
-    }
-
-    /// Per degree of freedom, beyond what is expected, px^2.
-    pub fn beyond_px2(&self) -> f64 {
-        self.sum_px2 / self.freedom - self.expected_px2
+        let expected = lever * mean_px2;
+        (expected > 0.0).then_some(Squares { sum, freedom, expected })
     }
 }
 
@@ -155,18 +173,10 @@ const MIN_SHARE: f64 = 0.8;
 /// How many pixels of a frame are looked at, and the slopes of their residuals, px at one standard deviation from
 /// the middle.
 fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> (f64, [f64; 2]) {
-    let (mut n, mut sum, mut of_axes, mut places) = (0.0, 0.0, [0.0; 2], [0.0; 2]);
-    for ((&e, at), sigma) in residuals.iter().zip(axes).zip(&field.sigma) {
-        if e.abs() <= CLIP_SIGMAS * sigma.max(field.spread_px) {
-            let e = f64::from(e);
-            n += 1.0;
-            sum += e;
-            for axis in [0, 1] {
-                of_axes[axis] += at[axis] * e;
-                places[axis] += at[axis];
-            }
-        }
-    }
+    let pixels = residuals.iter().zip(axes).zip(&field.sigma);
+    let seen = pixels.filter(|((e, _), sigma)| e.abs() <= CLIP_SIGMAS * sigma.max(field.spread_px));
+    let (a, b) = plane_equations(seen.map(|((&e, at), _)| (*at, f64::from(e), 1.0)));
+    let n = a[(0, 0)];
     // Pixels that are lost move the middle.
-    (n, [0, 1].map(|axis| (of_axes[axis] - places[axis] * sum / n) / n))
+    (n, [1, 2].map(|axis| (b[axis] - a[(0, axis)] * b[0] / n) / n))
 }

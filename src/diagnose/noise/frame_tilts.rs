@@ -1,6 +1,6 @@
 //! Frames whose slope over the picture changes as the pixels' noise does not explain.
 
-use super::frame_series::{Excess, TiltScatter};
+use super::frame_series::{Excess, Squares};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
@@ -9,20 +9,12 @@ use crate::terms::{Axis, Statistic};
 
 /// Slopes that scatter as neither noise nor what moves the frames' means by `jitter_px2` explains.
 pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<TextureFinding> {
-    let all: Vec<TiltScatter> = views.iter().filter_map(|s| s.tilts).collect();
-    let freedom: f64 = all.iter().map(|t| t.freedom).sum();
-    let expected = |t: &TiltScatter| t.expected_px2 + jitter_px2;
-    let ratio: f64 = all.iter().map(|t| t.sum_px2 / expected(t)).sum();
-    let Excess { p, nats } = Excess::of(ratio, freedom);
-    let beyond = |t: &TiltScatter| t.sum_px2 - t.freedom * expected(t);
-    let beyond_px2 = all.iter().map(beyond).sum::<f64>() / freedom;
-    if !(p < level && beyond_px2 > 0.0) {
-        return None;
-    }
-    let sigma = beyond_px2.sqrt();
+    let tilts = views.iter().filter_map(|s| s.tilts);
+    let beside = tilts.map(|t| Squares { expected: t.expected + jitter_px2, ..t });
+    let Excess { size, std_error, p, nats } = Excess::of(beside, level)?;
     Some(TextureFinding {
-        parameters: one("sigma_px", sigma, sigma / (2.0 * freedom).sqrt()),
-        size_sigma: sigma / variance_px2(views).max(1e-12).sqrt(),
+        parameters: one("sigma_px", size, std_error),
+        size_sigma: size / variance_px2(views).max(1e-12).sqrt(),
         p,
         nats,
         words: Some("the slope over the picture changes from frame to frame".into()),
@@ -68,7 +60,7 @@ mod tests {
                 ..Field::unseen(Plane::tilted(1.0, 0.0, 0.0), 10.0, SIZE, (0..n as u32).collect())
             };
             let variance_px2 = (0..n).map(|i| size(i).powi(2)).sum::<f64>() / n as f64;
-            let tilts = TiltScatter::of(&field, variance_px2 / n as f64);
+            let tilts = Squares::of_slopes(&field, variance_px2 / n as f64);
             Structure { variance_px2, tilts, ..Structure::default() }
         };
         (0..40).map(view).collect()
@@ -79,8 +71,7 @@ mod tests {
     #[test]
     fn slopes_are_found_with_their_size_and_noise_has_none() {
         let still = views(0.0);
-        let ratio =
-            |s: &Structure| s.tilts.map(|t| t.sum_px2 / t.freedom / t.expected_px2).expect("tilts");
+        let ratio = |s: &Structure| s.tilts.map(|t| t.sum / t.freedom / t.expected).expect("tilts");
         let mean = still.iter().map(ratio).sum::<f64>() / 40.0;
         assert!((mean - 1.0).abs() < 0.35, "{mean}");
         assert!(frame_tilts(&still, 0.0, 1e-3).is_none());

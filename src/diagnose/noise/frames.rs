@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use super::frame_series::Excess;
+use super::frame_series::{Excess, Squares};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats};
@@ -40,31 +40,19 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
 
 /// Frames that are now noisier and now quieter than chance has it, by what their logarithms scatter.
 pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
-    let (mut ratio, mut freedom, mut beyond) = (0.0, 0.0, 0.0);
-    for s in views {
+    let squares = |s: &Structure| {
         let logs: Vec<f64> = s.frame_log_variance.iter().flatten().copied().collect();
         let (n, [_, of_rows]) = (logs.len() as f64, s.excess_of_rows(&Correlation::white()));
         // Each frame's logarithm is over the mean of the others': n / (n - 1) of what it is off their common mean.
-        let squares: f64 = logs.iter().map(|x| (x * (n - 1.0) / n).powi(2)).sum();
+        let sum: f64 = logs.iter().map(|x| (x * (n - 1.0) / n).powi(2)).sum();
         let expected = 2.0 * s.repeats() * of_rows / s.frame_pixels;
-        if n > 1.0 && expected.is_finite() {
-            ratio += squares / expected;
-            freedom += n - 1.0;
-            beyond += squares - (n - 1.0) * expected;
-        }
-    }
-    let Excess { p, nats } = Excess::of(ratio, freedom);
-    if !(p < level && beyond > 0.0) {
-        return None;
-    }
-    let log_variance = (beyond / freedom).sqrt();
+        let measured = n > 1.0 && expected.is_finite();
+        measured.then_some(Squares { sum, freedom: n - 1.0, expected })
+    };
+    let Excess { size, std_error, p, nats } = Excess::of(views.iter().filter_map(squares), level)?;
     Some(TextureFinding {
-        parameters: one(
-            "spread_of_log_variance",
-            log_variance,
-            log_variance / (2.0 * freedom).sqrt(),
-        ),
-        size_sigma: (0.5 * log_variance).exp() - 1.0,
+        parameters: one("spread_of_log_variance", size, std_error),
+        size_sigma: (0.5 * size).exp() - 1.0,
         p,
         nats,
         words: Some(

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::frame_series::{Jitter, TiltScatter};
+use super::frame_series::{Jitter, Squares};
 use super::moments::Moments;
 use super::pairs::{Pairs, REACH_PX};
 use super::still::{KeptPattern, beside_bias, still};
@@ -49,7 +49,7 @@ pub struct Structure {
     /// Of the frames' means about a line in time.
     pub jitter: Option<Jitter>,
     /// Of the frames' slopes over the picture.
-    pub tilts: Option<TiltScatter>,
+    pub tilts: Option<Squares>,
     /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
     /// The places where such lie.
@@ -157,7 +157,7 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     s.jitter = Jitter::of(field, of_mean_px2);
     let columns = (s.pixels / rows(field)).max(1.0);
     let of_columns_px2 = s.column_px2.unwrap_or(0.0).max(0.0) / columns;
-    s.tilts = TiltScatter::of(field, of_mean_px2 + of_columns_px2);
+    s.tilts = Squares::of_slopes(field, of_mean_px2 + of_columns_px2);
     s
 }
 
