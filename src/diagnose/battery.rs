@@ -156,7 +156,7 @@ impl Case<'_> {
         let of_steps = matches!(f.statistic, Statistic::Bias | Statistic::Variance)
             && coarsest > COARSE_SIGMAS * sigma_px;
         // Steps of depth come at no period of the disparity, and pass for one over a few of them.
-        let aliased = self.lattice.depth_step_m.is_some() && f.axis == Axis::DisparityPhase;
+        let aliased = self.lattice.depth.is_some() && f.axis == Axis::DisparityPhase;
         let stepped = of_steps
             && (f.effect.is_none() || aliased)
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)

@@ -5,7 +5,8 @@ use crate::diagnose::noise::in_time::still_level;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::texture_findings;
-use crate::diagnose::steps::lattice::Quantisation;
+use crate::diagnose::steps::lattice::{Quantisation, Step};
+use crate::diagnose::steps::{KINDS, Kind};
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
 use crate::stats::{mean, range};
@@ -72,14 +73,13 @@ impl Baseline {
         if self.heavy {
             known.learn("heavy-tails", "fraction", 0.0);
         }
-        let alike = |a: Option<f64>, b: Option<f64>| {
-            a.zip(b).is_some_and(|(a, b)| (a / b).ln().abs() < STEPS_ALIKE)
+        let alike = |a: Option<Step>, b: Option<Step>| {
+            a.zip(b).is_some_and(|(a, b)| (a.size / b.size).ln().abs() < STEPS_ALIKE)
         };
-        if alike(self.lattice.disparity_step_px, real.disparity_step_px) {
-            known.learn("disparity-quantisation", "step_px", 0.0);
-        }
-        if alike(self.lattice.depth_step_m, real.depth_step_m) {
-            known.learn("depth-rounding", "step_m", 0.0);
+        for Kind { id, parameter, of, .. } in KINDS {
+            if alike(of(&self.lattice), of(real)) {
+                known.learn(id, parameter, 0.0);
+            }
         }
     }
 

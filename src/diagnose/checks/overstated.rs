@@ -60,10 +60,10 @@ impl Case<'_> {
             (p < level).then_some(Finding { share, size, p_adjusted: Some(p), ..finding })
         };
         let steps = contradicted(&self.fields, &self.known, self.recording).into_iter();
-        let steps = steps.map(|c| Finding {
-            share: c.nats,
-            size: c.size,
-            ..finding(&self.known, c.id, Statistic::Distribution, c.axis)
+        let steps = steps.map(|f| Finding {
+            share: f.share,
+            size: f.size,
+            ..finding(&self.known, f.effect.unwrap_or_default(), f.statistic, f.axis)
         });
         claims.filter_map(told).chain(steps).collect()
     }

@@ -1,7 +1,7 @@
 //! Which depths occur at all: the steps of the matcher, and those of the driver.
 
 use super::comb::{
-    COARSE, Comb, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities, steps_of_words,
+    COARSE, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities, steps_of_words,
 };
 use crate::frame::DepthCode;
 use crate::view::Sensor;
@@ -10,16 +10,21 @@ use crate::view::Sensor;
 #[derive(Debug, Clone)]
 pub struct RawHistogram(pub Vec<u32>);
 
+/// A step that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    pub size: f64,
+    /// Chance of it were all words as likely to occur; `None` where the format has the steps.
+    pub p: Option<f64>,
+}
+
 /// Steps that were found.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Quantisation {
-    /// All words are multiples of this many units: depth in metres a step.
-    pub depth_step_m: Option<f64>,
+    /// All words are multiples of so many units: depth in metres a step.
+    pub depth: Option<Step>,
     /// Occurring disparities are multiples of this, px, give or take a constant.
-    pub disparity_step_px: Option<f64>,
-    /// Chance of such steps were all words as likely to occur; `None` where the format has the steps.
-    pub depth_p: Option<f64>,
-    pub disparity_p: Option<f64>,
+    pub disparity: Option<Step>,
 }
 
 /// Fewer distinct words than this make no lattice.
@@ -32,24 +37,14 @@ const GATHERED_AT_ALL: f64 = 0.4;
 const STEP_ERROR: f64 = 0.02;
 
 impl Quantisation {
-    /// Steps of the depth alone.
-    fn of_depth(depth_step_m: Option<f64>, p: Option<f64>) -> Self {
-        Quantisation { depth_step_m, depth_p: p, ..Quantisation::default() }
-    }
-
-    /// Steps of the disparity alone.
-    fn of_disparity(disparity_step_px: Option<f64>, p: Option<f64>) -> Self {
-        Quantisation { disparity_step_px, disparity_p: p, ..Quantisation::default() }
-    }
-
     pub fn is_some(&self) -> bool {
-        self.depth_step_m.is_some() || self.disparity_step_px.is_some()
+        self.depth.is_some() || self.disparity.is_some()
     }
 
     /// The coarser step at this depth, px.
     pub fn step_px(&self, scale_px_m: f64, z: f64) -> f64 {
-        let depth = self.depth_step_m.map_or(0.0, |step| step * scale_px_m / (z * z));
-        self.disparity_step_px.unwrap_or(0.0).max(depth)
+        let depth = self.depth.map_or(0.0, |step| step.size * scale_px_m / (z * z));
+        self.disparity.map_or(0.0, |step| step.size).max(depth)
     }
 }
 
@@ -80,21 +75,24 @@ impl RawHistogram {
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
+                let of_depth = |size, p| Step { size: size / units_per_metre, p };
                 if stride > 1 {
                     let p = all_multiples(stride, words.len());
-                    return Quantisation::of_depth(Some(stride as f64 / units_per_metre), Some(p));
+                    let depth = Some(of_depth(stride as f64, Some(p)));
+                    return Quantisation { depth, disparity: None };
                 }
                 if self.contrast(&words) < CONTRAST {
                     return Quantisation::default();
                 }
                 let disparity = steps_of_disparities(&words, scale_px_m * units_per_metre);
                 let depth = steps_of_depths(&words);
-                let told = |comb: &Comb| comb.step().and(Some(comb.p));
                 if depth.resultant > disparity.resultant {
-                    let step_m = depth.step().map(|units| units / units_per_metre);
-                    return Quantisation::of_depth(step_m, told(&depth));
+                    let depth = depth.step().map(|size| of_depth(size, Some(depth.p)));
+                    return Quantisation { depth, disparity: None };
                 }
-                Quantisation::of_disparity(disparity.step(), told(&disparity))
+                let p = Some(disparity.p);
+                let disparity = disparity.step().map(|size| Step { size, p });
+                Quantisation { depth: None, disparity }
             }
             DepthCode::Disparity { slope, .. } => {
                 // Words are the lattice; what is left to see is whether a coarser one leaves some empty.
@@ -105,8 +103,9 @@ impl RawHistogram {
                 } else {
                     steps_of_words(&words)
                 };
-                let step_px = coarser.map_or(1.0, |c| c.0) * word_px;
-                Quantisation::of_disparity(Some(step_px), coarser.map(|c| c.1))
+                let size = coarser.map_or(1.0, |c| c.0) * word_px;
+                let disparity = Some(Step { size, p: coarser.map(|c| c.1) });
+                Quantisation { depth: None, disparity }
             }
         }
     }
@@ -220,29 +219,27 @@ mod tests {
         };
         for step_px in [0.16, 0.2, 0.25, 1.0 / 3.0, 0.5, 0.9125, 1.2125, 1.675] {
             let found = found(step_px);
-            let step = found.disparity_step_px.expect("a step");
-            assert!((step / step_px - 1.0).abs() < 5e-3, "{step_px}: {found:?}");
-            assert!(found.disparity_p.is_some_and(|p| p < 1e-4), "{found:?}");
+            let step = found.disparity.expect("a step");
+            assert!((step.size / step_px - 1.0).abs() < 5e-3, "{step_px}: {found:?}");
+            assert!(step.p.is_some_and(|p| p < 1e-4), "{found:?}");
         }
-        let own = found(0.0);
-        assert!((own.disparity_step_px.unwrap() / word_px - 1.0).abs() < 1e-9, "{own:?}");
-        assert_eq!(own.disparity_p, None);
+        let own = found(0.0).disparity.unwrap();
+        assert!((own.size / word_px - 1.0).abs() < 1e-9 && own.p.is_none(), "{own:?}");
     }
 
     #[test]
     fn steps_of_matcher_and_driver_are_found_and_none_where_there_are_none() {
         let sensor = kinect_v1(1);
         let found = words(0.125, 0.0).lattice(&sensor, 43.5);
-        assert!((found.disparity_step_px.unwrap() / 0.125 - 1.0).abs() < 2e-3, "{found:?}");
+        assert!((found.disparity.unwrap().size / 0.125 - 1.0).abs() < 2e-3, "{found:?}");
         let found = words(0.0, 0.001).lattice(&sensor, 43.5);
-        assert_eq!((found.depth_step_m, found.disparity_step_px), (Some(0.001), None));
+        assert_eq!((found.depth.map(|step| step.size), found.disparity), (Some(0.001), None));
         for rounding in [0.00045, 0.000907, 0.00121, 0.0123] {
             let found = words(0.0, rounding).lattice(&sensor, 43.5);
-            let step = found.depth_step_m.expect("a step that is no whole number of units");
-            assert!((step / rounding - 1.0).abs() < 1e-4, "{rounding}: {found:?}");
-            assert!(found.disparity_step_px.is_none() && found.depth_p.is_some_and(|p| p < 1e-9));
+            let step = found.depth.expect("a step that is no whole number of units");
+            assert!((step.size / rounding - 1.0).abs() < 1e-4, "{rounding}: {found:?}");
+            assert!(found.disparity.is_none() && step.p.is_some_and(|p| p < 1e-9));
         }
-        let found = words(0.0, 0.0).lattice(&sensor, 43.5);
-        assert_eq!((found.depth_step_m, found.disparity_step_px), (None, None), "{found:?}");
+        assert_eq!(words(0.0, 0.0).lattice(&sensor, 43.5), Quantisation::default());
     }
 }

@@ -13,7 +13,7 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::frame::DepthCode;
 use crate::terms::{Axis, PixelContext, Statistic};
 use crate::view::Recording;
-use lattice::{Quantisation, RawHistogram};
+use lattice::{Quantisation, RawHistogram, Step};
 
 /// Variance that comes by other names than sigma: of steps, rows, and pixels.
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +30,7 @@ impl Steps {
         fields: &[Field],
         recording: &Recording,
     ) -> Self {
-        let step_px = lattice.disparity_step_px.unwrap_or(0.0);
+        let step_px = lattice.disparity.map_or(0.0, |step| step.size);
         let own_px = word_px(recording, fields[0].scale_px_m).unwrap_or(0.0);
         let words = step_px / own_px;
         let whole = own_px > 0.0 && (words.round() / words - 1.0).abs() < SAME_STEP;
@@ -38,7 +38,7 @@ impl Steps {
         let single = fields.iter().all(|f| f.frames.len() < 2);
         let still = if single { fixed_px2(structure) } else { 0.0 };
         Steps {
-            depth_px_m2: lattice.depth_step_m.unwrap_or(0.0) * fields[0].scale_px_m,
+            depth_px_m2: lattice.depth.map_or(0.0, |step| step.size) * fields[0].scale_px_m,
             // Words of a raw sensor are in the model's variance already. A step that is no whole number
             // of them is rounded twice.
             disparity_px: if whole {
@@ -87,7 +87,7 @@ pub(in crate::diagnose) fn own_step(
     px_m: f64,
 ) -> Option<f64> {
     let word = word_px(recording, px_m)?;
-    lattice.disparity_step_px.filter(|step| (step / word - 1.0).abs() < SAME_STEP)
+    lattice.disparity.map(|step| step.size).filter(|step| (step / word - 1.0).abs() < SAME_STEP)
 }
 
 pub(in crate::diagnose) fn own_step_note(step: f64) -> String {
@@ -117,78 +117,96 @@ pub(in crate::diagnose) fn forget_windows(
     }
 }
 
-/// A step of the model that the words do not lie on.
-pub(in crate::diagnose) struct Contradicted {
+/// Steps of the disparity, or of the depth.
+pub(in crate::diagnose) struct Kind {
     pub id: &'static str,
-    pub axis: Axis,
-    /// Of the error that it would make, and what that is worth.
-    pub size: Size,
-    pub nats: f64,
+    pub parameter: &'static str,
+    axis: Axis,
+    pub of: fn(&Quantisation) -> Option<Step>,
+    /// A step in the middle of a view, px.
+    px: fn(f64, &Field) -> f64,
+    /// Standard error of a step that is found, as a share.
+    error: f64,
 }
 
-pub(in crate::diagnose) fn contradicted(
-    fields: &[Field],
-    known: &KnownTerms,
-    recording: &Recording,
-) -> Vec<Contradicted> {
-    let mut words = RawHistogram::none();
-    fields.iter().for_each(|f| words.merge(&f.words));
-    let (sigma_px, sigma_mm) = (typical_sigma_px(fields), typical_sigma_mm(fields));
-    let sensor = &recording.sensor;
-    let size = |sigma: f64| Size { mm: sigma * sigma_mm, sigma };
-    let disparity = known.parameter("disparity-quantisation", "step_px").and_then(|step| {
-        let lies = words.on_disparities(step, sensor, fields[0].scale_px_m)?;
-        (!lies).then(|| Contradicted {
-            id: "disparity-quantisation",
-            axis: Axis::DisparityPhase,
-            size: size(step / 12f64.sqrt() / sigma_px),
-            nats: step_nats(fields, |_| step),
+pub(in crate::diagnose) const KINDS: [Kind; 2] = [
+    Kind {
+        id: "disparity-quantisation",
+        parameter: "step_px",
+        axis: Axis::DisparityPhase,
+        of: |lattice| lattice.disparity,
+        px: |step, _| step,
+        error: 0.002,
+    },
+    Kind {
+        id: "depth-rounding",
+        parameter: "step_m",
+        axis: Axis::Z,
+        of: |lattice| lattice.depth,
+        px: |step, f| step * f.scale_px_m / f.plane.depth(0.0, 0.0).powi(2),
+        error: 0.0,
+    },
+];
+
+impl Kind {
+    fn is_of_depth(&self) -> bool {
+        self.axis == Axis::Z
+    }
+
+    /// The variance that a step adds in each view, as a share of its noise's.
+    fn added(&self, step: f64, fields: &[Field]) -> impl Iterator<Item = f64> {
+        fields.iter().map(move |f| {
+            let sigma = f.middle_sigma_px().map_or(f64::INFINITY, f64::from);
+            ((self.px)(step, f) / sigma).powi(2) / 12.0
         })
-    });
-    let depth = known.parameter("depth-rounding", "step_m").and_then(|step| {
-        let lies = words.on_depths(step, sensor)?;
-        (!lies).then(|| Contradicted {
-            id: "depth-rounding",
-            axis: Axis::Z,
-            size: size(1e3 * step / 12f64.sqrt() / sigma_mm),
-            nats: step_nats(fields, in_px(step, fields)),
-        })
-    });
-    disparity.into_iter().chain(depth).filter(|c| c.size.sigma > STEP_SHARE).collect()
+    }
+
+    /// A model lacks this step, or has it too much. Its worth is the Kullback-Leibler divergence of the Gaussians
+    /// with and without its variance, over all readings, nats. That words come in steps tells far more, but of the
+    /// format.
+    fn finding(&self, step: f64, fields: &[Field]) -> Finding {
+        let of = |(f, more): (&Field, f64)| {
+            let readings: f64 = f.count.iter().map(|n| f64::from(*n)).sum();
+            0.5 * readings * (more - more.ln_1p())
+        };
+        let sigma_mm = typical_sigma_mm(fields);
+        let size = if self.is_of_depth() {
+            let mm = 1e3 * step / 12f64.sqrt();
+            Size { mm, sigma: mm / sigma_mm }
+        } else {
+            let sigma = step / 12f64.sqrt() / typical_sigma_px(fields);
+            Size { mm: sigma * sigma_mm, sigma }
+        };
+        Finding {
+            share: fields.iter().zip(self.added(step, fields)).map(of).sum(),
+            size,
+            ..named(self.id, Statistic::Distribution, self.axis)
+        }
+    }
 }
 
 /// A step is worth telling when the error it makes is this share of the noise in some view; that a model
 /// has one which the words contradict, when it is this share of the usual noise.
 const STEP_SHARE: f64 = 0.1;
 
-/// A step of the depth, m, as one of the disparity at a depth, px.
-fn in_px(step_m: f64, fields: &[Field]) -> impl Fn(f64) -> f64 + use<> {
-    let scale_px_m = fields[0].scale_px_m;
-    move |z| step_m * scale_px_m / (z * z)
-}
-
-/// The variance that a step adds in each view, as a share of its noise's; `px` is the step at a depth, px.
-fn added(fields: &[Field], px: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
-    fields.iter().map(move |f| {
-        let sigma = f.middle_sigma_px().map_or(f64::INFINITY, f64::from);
-        (px(f.plane.depth(0.0, 0.0)) / sigma).powi(2) / 12.0
-    })
-}
-
-/// The largest error of a step among the views, in sigmas.
-fn strongest(fields: &[Field], px: impl Fn(f64) -> f64) -> f64 {
-    added(fields, px).fold(0.0, f64::max).sqrt()
-}
-
-/// What a step is worth that a model lacks, or has too much: the Kullback-Leibler divergence of the
-/// Gaussians with and without its variance, over all readings, nats. That words come in steps tells far
-/// more, but of the format.
-fn step_nats(fields: &[Field], px: impl Fn(f64) -> f64) -> f64 {
-    let of = |(f, more): (&Field, f64)| {
-        let readings: f64 = f.count.iter().map(|n| f64::from(*n)).sum();
-        0.5 * readings * (more - more.ln_1p())
+/// Steps of the model that the words do not lie on.
+pub(in crate::diagnose) fn contradicted(
+    fields: &[Field],
+    known: &KnownTerms,
+    recording: &Recording,
+) -> Vec<Finding> {
+    let mut words = RawHistogram::none();
+    fields.iter().for_each(|f| words.merge(&f.words));
+    let of = |kind: &Kind| {
+        let step = known.parameter(kind.id, kind.parameter)?;
+        let lies = if kind.is_of_depth() {
+            words.on_depths(step, &recording.sensor)?
+        } else {
+            words.on_disparities(step, &recording.sensor, fields[0].scale_px_m)?
+        };
+        (!lies).then(|| kind.finding(step, fields)).filter(|f| f.size.sigma > STEP_SHARE)
     };
-    fields.iter().zip(added(fields, px)).map(of).sum()
+    KINDS.iter().filter_map(of).collect()
 }
 
 pub(in crate::diagnose) fn steps(
@@ -198,53 +216,27 @@ pub(in crate::diagnose) fn steps(
     recording: &Recording,
     second: &[bool],
 ) -> Vec<Finding> {
-    let replicated = |step: fn(&Quantisation) -> Option<f64>| {
-        let [a, b] = [false, true].map(|half| {
+    let disparity_counts = recording.sensor.may_have_disparity()
+        && own_step(lattice, recording, fields[0].scale_px_m).is_none();
+    let found = |kind: &Kind| {
+        let step = (kind.of)(lattice).filter(|_| disparity_counts || kind.is_of_depth())?;
+        let strongest = kind.added(step.size, fields).fold(0.0, f64::max).sqrt();
+        if known.has(kind.id) || strongest <= STEP_SHARE {
+            return None;
+        }
+        let halves = [false, true].map(|half| {
             let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
-            step(&self::lattice(mine.map(|(f, _)| f), recording))
+            (kind.of)(&self::lattice(mine.map(|(f, _)| f), recording))
         });
-        Some(a.zip(b).is_some_and(|(a, b)| (a / b - 1.0).abs() < SAME_STEP))
-    };
-    let found = |effect, axis, size: Size, nats| Finding {
-        share: nats,
-        size,
-        ..named(effect, Statistic::Distribution, axis)
-    };
-    let (sigma_px, sigma_mm) = (typical_sigma_px(fields), typical_sigma_mm(fields));
-    let of_disparity = lattice.disparity_step_px.filter(|_| {
-        recording.sensor.may_have_disparity()
-            && !known.has("disparity-quantisation")
-            && own_step(lattice, recording, fields[0].scale_px_m).is_none()
-    });
-    let of_disparity = of_disparity.and_then(|step| {
-        let sigma = step / 12f64.sqrt() / sigma_px;
-        let size = Size { mm: sigma * sigma_mm, sigma };
-        let error = 0.002 * step;
-        (strongest(fields, |_| step) > STEP_SHARE).then(|| Finding {
-            interval: [0.0, 1.0],
-            parameters: one("step_px", step, error),
-            p_adjusted: lattice.disparity_p,
-            replicated: replicated(|l| l.disparity_step_px),
-            ..found(
-                "disparity-quantisation",
-                Axis::DisparityPhase,
-                size,
-                step_nats(fields, |_| step),
-            )
+        let same = |a: Step, b: Step| (a.size / b.size - 1.0).abs() < SAME_STEP;
+        let depths = || crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));
+        Some(Finding {
+            interval: if kind.is_of_depth() { depths() } else { [0.0, 1.0] },
+            parameters: one(kind.parameter, step.size, kind.error * step.size),
+            p_adjusted: step.p,
+            replicated: Some(halves[0].zip(halves[1]).is_some_and(|(a, b)| same(a, b))),
+            ..kind.finding(step.size, fields)
         })
-    });
-    let of_depth = lattice.depth_step_m.filter(|_| !known.has("depth-rounding"));
-    let of_depth = of_depth.and_then(|step| {
-        let mm = 1e3 * step / 12f64.sqrt();
-        let size = Size { mm, sigma: mm / sigma_mm };
-        let px = in_px(step, fields);
-        (strongest(fields, &px) > STEP_SHARE).then(|| Finding {
-            interval: crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0))),
-            parameters: one("step_m", step, 0.0),
-            p_adjusted: lattice.depth_p,
-            replicated: replicated(|l| l.depth_step_m),
-            ..found("depth-rounding", Axis::Z, size, step_nats(fields, px))
-        })
-    });
-    of_disparity.into_iter().chain(of_depth).collect()
+    };
+    KINDS.iter().filter_map(found).collect()
 }
