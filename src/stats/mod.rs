@@ -9,6 +9,8 @@ mod summed_area;
 pub use budget::{
     Budget, COVERAGE_FACTOR, Component, Distribution, Evaluation, rounding_uncertainty,
 };
+#[cfg(test)]
+pub use correlation::noise_through_boxes;
 pub use correlation::{Correlation, measure_correlation};
 pub use paule_mandel::{between, paule_mandel};
 pub use random_effects::{RandomEffects, common_value};

@@ -69,38 +69,23 @@ mod tests {
 
     use super::*;
     use crate::diagnose::noise::texture::frame_log_variance;
-    use crate::rng::Seed;
+    use crate::rng::{Seed, Stream};
 
-    /// Views of four frames, 5000 pixels each, the first frame's noise times `first`.
-    fn views(name: &str, first: f64) -> Vec<Structure> {
-        let view = |n: u64| {
-            let mut rng = Seed(n).stream(name);
-            let mut frame = |size: f64| -> Vec<f32> {
-                let mut one = || -> f64 { StandardNormal.sample(&mut rng) };
-                (0..5000).map(|_| (size * one()) as f32).collect()
+    /// Twelve views of four frames, 5000 pixels each, whose noise is `size` times a frame; a share of the readings is
+    /// lost.
+    fn views(seed: u64, lost: f64, size: impl Fn(usize, &mut Stream) -> f64) -> Vec<Structure> {
+        let mut rng = Seed(seed).stream("frames");
+        let mut frame = |k: usize| -> Vec<f32> {
+            let size = size(k, &mut rng);
+            let mut one = || {
+                let x = size * normal(&mut rng);
+                if rng.random::<f64>() < lost { f32::NAN } else { x as f32 }
             };
-            let frames = [first, 1.0, 1.0, 1.0].map(&mut frame);
-            let (frame_log_variance, _) = frame_log_variance(&frames);
-            Structure { frame_log_variance, ..Structure::default() }
+            (0..5000).map(|_| one()).collect()
         };
-        (0..12).map(view).collect()
-    }
-
-    /// Twelve views, of whose four frames each is louder or quieter by a Gaussian of this size in the logarithm of
-    /// its standard deviation; a share of the readings is lost.
-    fn flickering(seed: u64, by: f64, lost: f64) -> Vec<Structure> {
-        let mut rng = Seed(seed).stream("flicker");
-        let mut view = || {
-            let mut frame = || -> Vec<f32> {
-                let of_frame: f64 = StandardNormal.sample(&mut rng);
-                let size = (by * of_frame).exp();
-                let mut one = || {
-                    let x: f64 = StandardNormal.sample(&mut rng);
-                    if rng.random::<f64>() < lost { f32::NAN } else { (size * x) as f32 }
-                };
-                (0..5000).map(|_| one()).collect()
-            };
-            let (frame_log_variance, frame_pixels) = frame_log_variance(&[(); 4].map(|()| frame()));
+        let view = |_| {
+            let (frame_log_variance, frame_pixels) =
+                frame_log_variance(&[0, 1, 2, 3].map(&mut frame));
             let (pixels, variance_px2) = (5000.0 * (1.0 - lost), 1.0);
             Structure {
                 pixels,
@@ -110,7 +95,16 @@ mod tests {
                 ..Structure::default()
             }
         };
-        (0..12).map(|_| view()).collect()
+        (0..12).map(view).collect()
+    }
+
+    fn normal(rng: &mut Stream) -> f64 {
+        StandardNormal.sample(rng)
+    }
+
+    /// Each frame is louder or quieter by a Gaussian of this size in the logarithm of its standard deviation.
+    fn flickering(seed: u64, by: f64, lost: f64) -> Vec<Structure> {
+        views(seed, lost, |_, rng| (by * normal(rng)).exp())
     }
 
     /// The variance's logarithm changes by twice as much as that of the standard deviation, to 1 / sqrt(2 * 36).
@@ -126,9 +120,10 @@ mod tests {
 
     #[test]
     fn the_frame_that_is_louder_is_found_with_its_size() {
-        let found = unequal(&views("unequal/first", 1.1), 1e-3).unwrap();
+        let first = |size: f64| views(1, 0.0, move |k, _| if k == 0 { size } else { 1.0 });
+        let found = unequal(&first(1.1), 1e-3).unwrap();
         assert_eq!(found.parameters["frame"], json!(0));
         assert!((found.size_sigma - 0.1).abs() < 0.01, "{}", found.size_sigma);
-        assert!(unequal(&views("unequal/none", 1.0), 1e-3).is_none());
+        assert!(unequal(&first(1.0), 1e-3).is_none());
     }
 }

@@ -124,6 +124,7 @@ impl Moments {
 mod tests {
     use super::*;
     use crate::rng::{Seed, Stream};
+    use crate::stats::noise_through_boxes;
     use rand_distr::{Distribution, StandardNormal, StudentT};
 
     const SIZE: [usize; 2] = [320, 240];
@@ -195,14 +196,11 @@ mod tests {
     #[test]
     fn a_window_wider_than_the_pairs_are_apart_tells_nothing() {
         const SIDE: usize = 16;
-        let white = white(&mut Seed(1).stream("kurtosis/window"));
-        let along = |values: &[f32], step: usize| -> Vec<f32> {
-            let at = |i: usize| (0..SIDE).filter_map(|k| values.get(i + k * step)).sum();
-            (0..values.len()).map(at).collect()
-        };
-        let image = along(&along(&white, 1), SIZE[0]);
+        let mut rng = Seed(1).stream("kurtosis/window");
+        let noise = noise_through_boxes(SIZE, SIDE, &mut rng);
+        let image: Vec<f32> = noise.into_iter().map(|r| r as f32).collect();
         assert_eq!(Moments::of(&image, SIZE[0]).excess(), None);
-        assert!(Moments::of(&white, SIZE[0]).excess().is_some());
+        assert!(Moments::of(&white(&mut rng), SIZE[0]).excess().is_some());
     }
 
     /// Too small a picture, words so coarse that most residuals are none, no noise at all.

@@ -183,8 +183,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnose::views::box_sums::noise_through_boxes;
     use crate::rng::Seed;
+    use crate::stats::noise_through_boxes;
 
     const WIDTH: usize = 120;
     const HEIGHT: usize = 90;

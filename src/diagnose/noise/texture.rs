@@ -233,8 +233,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::diagnose::views::box_sums::noise_through_boxes;
     use crate::rng::Seed;
+    use crate::stats::noise_through_boxes;
 
     /// An image of noise by boxes of this side beside rows that err by about so much of the variance, and
     /// their share as it turned out.

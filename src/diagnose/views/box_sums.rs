@@ -77,24 +77,6 @@ pub fn gross_limit(image: &[f32]) -> f32 {
     if limit > 0.0 { limit } else { f32::MAX }
 }
 
-/// Unit noise that comes through square boxes of `side` px, row by row.
-#[cfg(test)]
-pub fn noise_through_boxes(
-    [width, height]: [usize; 2],
-    side: usize,
-    rng: &mut crate::rng::Stream,
-) -> Vec<f64> {
-    use rand_distr::{Distribution, StandardNormal};
-    let wide = width + side;
-    let white: Vec<f64> = (0..wide * (height + side)).map(|_| StandardNormal.sample(rng)).collect();
-    let of_box = |i: usize| {
-        let (u, v) = (i % width, i / width);
-        let rows = (v..v + side).map(|v| white[v * wide + u..][..side].iter().sum::<f64>());
-        rows.sum::<f64>() / side as f64
-    };
-    (0..width * height).map(of_box).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

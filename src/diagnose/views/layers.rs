@@ -240,9 +240,9 @@ impl Survey {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::views::box_sums::noise_through_boxes;
     use crate::plane::Plane;
     use crate::rng::{Seed, Stream};
+    use crate::stats::noise_through_boxes;
 
     /// The mean of a target of this size, its noise through boxes of `side` px.
     fn field([width, height]: [usize; 2], side: usize, rng: &mut Stream) -> Field {
