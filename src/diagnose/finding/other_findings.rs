@@ -10,10 +10,32 @@ use crate::terms::{Axis, Statistic};
 
 /// A finding with this name and nothing else said yet; no test has weighed the name.
 pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding {
+    of_names(&[effect], statistic, axis, None)
+}
+
+/// A finding that has no name, and nothing else said yet.
+pub fn nameless(statistic: Statistic, axis: Axis) -> Finding {
+    of_names(&[], statistic, axis, None)
+}
+
+/// A finding of this shape with one of these names, best first, or with none, and nothing else said yet.
+pub fn of_names(
+    names: &[&'static str],
+    statistic: Statistic,
+    axis: Axis,
+    shape: Option<String>,
+) -> Finding {
+    let status = match names.len() {
+        0 => Status::Unexplained,
+        1 => Status::Named,
+        _ => Status::OneOf,
+    };
+    let effect = names.first().copied();
+    let alternative = |&effect: &&'static str| Alternative { effect, probability: None };
     Finding {
-        status: Status::Named,
-        effect: Some(effect),
-        alternatives: vec![Alternative { effect, probability: None }],
+        status,
+        effect,
+        alternatives: names.iter().map(alternative).collect(),
         statistic,
         axis,
         interval: [0.0, 0.0],
@@ -24,48 +46,20 @@ pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding 
         size: Size::default(),
         p_adjusted: None,
         replicated: None,
-        physics: physics(Status::Named, Some(effect), statistic, axis, None),
+        physics: physics(status, effect, statistic, axis, shape.as_deref()),
         next_view: None,
         of_some: None,
         contradicted: None,
-        shape: None,
+        shape,
         curve: None,
         terms: Vec::new(),
         covariance: Covariance::default(),
     }
 }
 
-/// A finding that has no name, and nothing else said yet.
-pub fn nameless(statistic: Statistic, axis: Axis) -> Finding {
-    Finding {
-        status: Status::Unexplained,
-        effect: None,
-        alternatives: Vec::new(),
-        ..named("", statistic, axis)
-    }
-}
-
 /// A mismatch of structure as a finding; `sigma_mm` is the recording's typical sigma.
 pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -> Finding {
-    let effect = found.families.first().copied();
-    let status = match found.families.len() {
-        0 => Status::Unexplained,
-        1 => Status::Named,
-        _ => Status::OneOf,
-    };
-    let mut words = physics(status, effect, found.statistic, found.axis, found.words.as_deref());
-    // Beside a name what was measured would be lost.
-    if let Some(measured) = found.words.as_ref().filter(|_| effect.is_some()) {
-        words += &format!(" Measured here: {measured}.");
-    }
-    Finding {
-        status,
-        effect,
-        alternatives: found
-            .families
-            .iter()
-            .map(|&effect| Alternative { effect, probability: None })
-            .collect(),
+    let mut finding = Finding {
         interval: found.interval,
         share: found.nats,
         parameters: found.parameters,
@@ -73,10 +67,13 @@ pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -
         p_adjusted: Some(found.p),
         replicated,
         of_some: found.of_some,
-        physics: words,
-        shape: found.words,
-        ..named(effect.unwrap_or_default(), found.statistic, found.axis)
+        ..of_names(&found.families, found.statistic, found.axis, found.words)
+    };
+    // Beside a name what was measured would be lost.
+    if let Some(measured) = finding.shape.as_ref().filter(|_| finding.effect.is_some()) {
+        finding.physics += &format!(" Measured here: {measured}.");
     }
+    finding
 }
 
 #[cfg(test)]

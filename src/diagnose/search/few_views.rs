@@ -15,10 +15,9 @@ use super::evidence::{self, Evidence, root};
 use super::noise_gains::{MIN_EXCESS, NoiseGains};
 use super::outcome::Outcome;
 use super::rules::Rules;
-use crate::diagnose::diagnosis::{Alternative, Finding, Status};
+use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::finding::along::Along;
-use crate::diagnose::finding::naming::physics;
-use crate::diagnose::finding::other_findings::named;
+use crate::diagnose::finding::other_findings::of_names;
 use crate::diagnose::finding::scene::{Scene, size};
 use crate::diagnose::views::samples::ViewData;
 use crate::rng::{Seed, Stream};
@@ -215,35 +214,23 @@ fn report(
     let mut values = scene.values(&term);
     let others = (0..values.len()).filter(|v| !best.views.contains(v)).collect::<Vec<_>>();
     others.into_iter().for_each(|v| values[v].iter_mut().for_each(|x| *x = 0.0));
-    let status = match names.len() {
-        0 => Status::Unexplained,
-        1 => Status::Named,
-        _ => Status::OneOf,
-    };
     let mut views: Vec<&str> =
         best.views.iter().map(|&v| scene.survey.views[v].name.as_str()).collect();
     views.sort_unstable();
     let only = format!("only in the views {}", views.join(", "));
-    let effect = names.first().copied();
     let along = Along::of(scene, &candidate.basis);
-    let finding = named(effect.unwrap_or_default(), statistic, axis);
-    Finding {
-        status,
-        effect,
-        alternatives: names
-            .iter()
-            .map(|&effect| Alternative { effect, probability: None })
-            .collect(),
+    let mut finding = Finding {
         interval: along.interval(scene, &values),
         share: best.gain,
         size: size(scene, &values),
         p_adjusted: Some(p),
-        physics: physics(status, effect, statistic, axis, Some(&only))
-            + &if effect.is_some() { format!(" It shows {only}.") } else { String::new() },
-        shape: Some(only),
         of_some: Some([best.views.len(), scene.survey.views.len()]),
-        ..finding
+        ..of_names(names, statistic, axis, Some(only.clone()))
+    };
+    if finding.effect.is_some() {
+        finding.physics += &format!(" It shows {only}.");
     }
+    finding
 }
 
 #[cfg(test)]
