@@ -50,8 +50,8 @@ impl Pairs {
         let lines = |count: usize, length: usize, at: &dyn Fn(usize, usize) -> usize| {
             let (mut sum, mut leverage) = (Sum::default(), 0.0);
             for line in 0..count {
-                let pixels = || (0..length).map(|k| at(line, k));
-                sum = sum.and(along(pixels().map(|i| level[i])));
+                let pixels = (0..length).map(|k| at(line, k));
+                sum = sum.and(along(pixels.clone().map(|i| f64::from(level[i]))));
                 leverage += plane.leverage_along(&level, pixels);
             }
             (sum.pairs >= FEWEST_PAIRS).then(|| (sum.products + taken * leverage) / sum.pairs)
@@ -88,7 +88,7 @@ impl Sum {
 }
 
 /// Pairs of a line's pixels in blocks that do not touch.
-fn along(line: impl Iterator<Item = f32>) -> Sum {
+fn along(line: impl Iterator<Item = f64>) -> Sum {
     let (mut whole, mut before, mut block) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     let mut close = [0.0; 2];
     let mut end = |block: [f64; 2], before: [f64; 2]| {
@@ -103,7 +103,7 @@ fn along(line: impl Iterator<Item = f32>) -> Sum {
             (before, block) = (block, [0.0; 2]);
         }
         if r.is_finite() {
-            block[0] += f64::from(r);
+            block[0] += r;
             block[1] += 1.0;
         }
     }
@@ -126,20 +126,20 @@ fn neighbours(image: &[f32], width: usize) -> Sum {
 struct Plane {
     width: usize,
     centre: [f64; 2],
-    /// Of its normal equations.
-    inverse: Matrix3<f64>,
+    /// Inverse of the Cholesky factor of its normal equations.
+    whitening: Matrix3<f64>,
 }
 
 impl Plane {
     /// The image less its plane; `None` with too few pixels for one.
     fn taken_from(image: &[f32], width: usize) -> Option<(Vec<f32>, Plane)> {
         let centre = [width, image.len() / width].map(|side| 0.5 * side as f64);
-        let mut plane = Plane { width, centre, inverse: Matrix3::zeros() };
+        let mut plane = Plane { width, centre, whitening: Matrix3::zeros() };
         let points = image.iter().enumerate().map(|(i, r)| (plane.place(i), f64::from(*r), 1.0));
         let (a, b) = plane_equations(points);
         let factor = a.cholesky()?;
         let fit = factor.solve(&b);
-        plane.inverse = factor.inverse();
+        plane.whitening = factor.l().try_inverse()?;
         let less = |(i, r): (usize, &f32)| r - fit.dot(&plane.columns(i)) as f32;
         Some((image.iter().enumerate().map(less).collect(), plane))
     }
@@ -155,26 +155,13 @@ impl Plane {
     }
 
     /// Leverage of two pixels of a line on one another, summed over the pairs of [`along`].
-    fn leverage_along<I>(&self, image: &[f32], line: impl Fn() -> I) -> f64
-    where
-        I: Iterator<Item = usize>,
-    {
-        let (Some(first), Some(last)) = (line().next(), line().last()) else { return 0.0 };
-        let (start, way) = (self.columns(first), self.columns(last) - self.columns(first));
-        let step = (line().count() as f64 - 1.0).max(1.0);
-        // Products of a pixel's place on the line, from 0 to 1, and of one more than that.
-        let products = |more: f64| {
-            let place = line().enumerate().map(|(k, i)| {
-                if image[i].is_finite() { (more + k as f64 / step) as f32 } else { f32::NAN }
-            });
-            along(place)
+    fn leverage_along(&self, image: &[f32], line: impl Iterator<Item = usize> + Clone) -> f64 {
+        let of = |k: usize| {
+            let whitened = |i: usize| (self.whitening * self.columns(i))[k];
+            let seen = |i: usize| if image[i].is_finite() { whitened(i) } else { f64::NAN };
+            along(line.clone().map(seen)).products
         };
-        let (of_place, of_more) = (products(0.0), products(1.0));
-        let once = of_more.products - of_place.products - of_place.pairs;
-        let of = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(&(self.inverse * b));
-        of_place.pairs * of(&start, &start)
-            + once * of(&start, &way)
-            + of_place.products * of(&way, &way)
+        (0..3).map(of).sum()
     }
 }
 
