@@ -54,10 +54,6 @@ pub(in crate::diagnose) fn typical_sigma_px(fields: &[Field]) -> f64 {
 /// Correlation of successive frames below which they are taken to have nothing in common.
 const HARDLY_STILL: f64 = 0.1;
 
-/// Noise of s times the disparity that is Gaussian in the depth has an excess kurtosis of 72 s^2 in the
-/// disparity, and the other way round: from here on 3e-4, a sixth of what a recording tells apart.
-const BENDS: f32 = 0.002;
-
 /// What the pixels' errors are held against: the model's sigma, as far as it says something (`None`: two recordings
 /// are compared, wherever they are), and what was found of the variance.
 pub(in crate::diagnose) struct Whitener<'a> {
@@ -87,37 +83,29 @@ pub(in crate::diagnose) fn measure_tails(
         let told: Vec<bool> = (0..field.pixels.len()).map(is_told).collect();
         let factor = |k: usize| factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
         let sigma_px: Vec<f32> = (0..told.len()).map(|k| field.sigma[k] * factor(k)).collect();
-        let disparity = |k| field.disparity(k, &bench.rays) as f32;
         // Single frames, unless what stands still in them could be taken for a tail.
         let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
-        let looks = |of: &(dyn Fn(usize, f32) -> f32 + Sync)| {
-            let whitened = |frame: &Vec<f32>| {
-                let white = |k: usize| {
-                    let error = frame[k] - bias.get(n).map_or(0.0, |b| b[k]);
-                    if told[k] { of(k, error) / sigma_px[k] } else { f32::NAN }
-                };
-                field.high_passed(&(0..frame.len()).map(white).collect::<Vec<f32>>())
+        let whitened = |frame: &Vec<f32>| {
+            let white = |k: usize| {
+                let error = frame[k] - bias.get(n).map_or(0.0, |b| b[k]);
+                if told[k] { error / sigma_px[k] } else { f32::NAN }
             };
-            let frames: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
-            if apart || frames.is_empty() { frames } else { vec![moving(&frames, s.lagged[0])] }
+            field.high_passed(&(0..frame.len()).map(white).collect::<Vec<f32>>())
         };
-        let moments = |looks: &[Vec<f32>]| {
-            let mut sum = Moments::default();
-            looks.iter().for_each(|look| sum.add(&Moments::of(look, field.width)));
-            sum
-        };
-        let in_disparity = looks(&|_, error| error);
-        s.tails = TailCounts::default();
-        let mut far = vec![false; in_disparity.first().map_or(0, Vec::len)];
-        in_disparity.iter().for_each(|look| s.tails.add(&tail(look, field.width, &mut far)));
+        let mut looks: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
+        if !apart && !looks.is_empty() {
+            looks = vec![moving(&looks, s.lagged[0])];
+        }
+        (s.tails, s.moments) = (TailCounts::default(), Moments::default());
+        let mut far = vec![false; looks.first().map_or(0, Vec::len)];
+        for look in &looks {
+            s.tails.add(&tail(look, field.width, &mut far));
+            s.moments.add(&Moments::of(look, field.width));
+        }
         s.far_places = places(far, field.width);
-        let bends = (0..field.pixels.len()).any(|k| field.sigma[k] > BENDS * disparity(k));
-        // An error of the depth is that of the disparity, e, over 1 + e / d.
-        let in_depth = |k: usize, error: f32| error / (1.0 + error / disparity(k));
-        s.moments = vec![moments(&in_disparity)];
+        let disparity = |k| field.disparity(k, &bench.rays) as f32;
         let relative = sigma_px.iter().enumerate().map(|(k, s)| f64::from(s / disparity(k)));
         s.relative_sigma = mean(relative.filter(|s| s.is_finite())).unwrap_or(0.0);
-        s.moments.extend(bends.then(|| moments(&looks(&in_depth))));
     });
 }
 

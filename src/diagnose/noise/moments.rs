@@ -123,6 +123,8 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::noise::structure::Structure;
+    use crate::diagnose::noise::tests::gaussian_in_depth;
     use crate::rng::{Seed, Stream};
     use crate::stats::noise_through_boxes;
     use rand_distr::{Distribution, StandardNormal, StudentT};
@@ -132,9 +134,16 @@ mod tests {
 
     /// Mean and standard error over the seeds.
     fn excess(draw: impl Fn(&mut Stream) -> Vec<f32>) -> [f64; 2] {
+        over_seeds(draw, |moments| moments.excess())
+    }
+
+    fn over_seeds(
+        draw: impl Fn(&mut Stream) -> Vec<f32>,
+        value: impl Fn(Moments) -> Option<f64>,
+    ) -> [f64; 2] {
         let of = |seed| {
             let image = draw(&mut Seed(seed).stream("kurtosis"));
-            Moments::of(&image, SIZE[0]).excess().expect("an excess")
+            value(Moments::of(&image, SIZE[0])).expect("an excess")
         };
         let all: Vec<f64> = (0..SEEDS).map(of).collect();
         let n = all.len() as f64;
@@ -168,16 +177,17 @@ mod tests {
     }
 
     /// Noise of 3 % that is Gaussian in the depth has an excess of 72 s^2 = .065 in the disparity, and
-    /// none once it is made a depth again.
+    /// none in the depth.
     #[test]
     fn what_is_gaussian_in_the_depth_looks_heavy_in_the_disparity() {
-        const S: f32 = 0.03;
+        const S: f64 = 0.03;
         let disparity = |rng: &mut Stream| -> Vec<f32> {
-            white(rng).iter().map(|x| -x / (1.0 + S * x)).collect()
+            (0..SIZE[0] * SIZE[1]).map(|_| gaussian_in_depth(S, rng) as f32).collect()
         };
         let found = excess(disparity);
         assert!((found[0] - 0.065).abs() < 4.0 * found[1], "{found:?}");
-        let depth = excess(|rng| disparity(rng).iter().map(|e| e / (1.0 + S * e)).collect());
+        let view = |moments| Structure { moments, relative_sigma: S, ..Structure::default() };
+        let depth = over_seeds(disparity, |moments| Some(view(moments).excess()?[1]));
         assert!(depth[0].abs() < 4.0 * depth[1], "{depth:?}");
     }
 

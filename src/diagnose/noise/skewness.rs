@@ -47,56 +47,29 @@ fn found(m: &ViewMean, sign: f64, p: f64) -> TextureFinding {
 
 #[cfg(test)]
 mod tests {
-    use rand_distr::{Distribution, Gamma, StandardNormal};
+    use rand_distr::{Distribution, Gamma};
 
     use super::*;
-    use crate::diagnose::noise::moments::Moments;
-    use crate::rng::{Seed, Stream};
-
-    const SIZE: [usize; 2] = [200, 150];
-
-    fn views(
-        stream: &str,
-        relative_sigma: f64,
-        draw: impl Fn(&mut Stream) -> f64,
-    ) -> Vec<Structure> {
-        let mut rng = Seed(6).stream(stream);
-        let view = |_| {
-            let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(|_| draw(&mut rng) as f32).collect();
-            let moments = vec![Moments::of(&image, SIZE[0])];
-            Structure {
-                pixels: image.len() as f64,
-                moments,
-                relative_sigma,
-                ..Structure::default()
-            }
-        };
-        (0..14).map(view).collect()
-    }
+    use crate::diagnose::noise::tests::{drawn, gaussian_in_depth, normal};
 
     /// A gamma distribution of shape k has a skewness of 2 / sqrt(k).
     #[test]
     fn a_gamma_distribution_is_skewed_and_a_gaussian_is_not() {
         const SHAPE: f64 = 100.0;
         let gamma = Gamma::new(SHAPE, 1.0).unwrap();
-        let skewed = views("gamma", 0.001, |rng| (gamma.sample(rng) - SHAPE) / SHAPE.sqrt());
+        let skewed = drawn("gamma", 0.001, |_, rng| (gamma.sample(rng) - SHAPE) / SHAPE.sqrt());
         let found = skewness(&skewed, 1e-3).expect("skewed");
         let told = found.parameters["skewness"]["value"].as_f64().unwrap();
         // Four standard errors of 420,000 readings, beside what the cut at 4.5 sigma takes.
         assert!((told - 0.194).abs() < 0.02, "{told}");
-        let gaussian = |rng: &mut Stream| StandardNormal.sample(rng);
-        assert!(skewness(&views("gaussian", 0.001, gaussian), 1e-3).is_none());
+        assert!(skewness(&drawn("gaussian", 0.001, |_, rng| normal(rng)), 1e-3).is_none());
     }
 
     /// Gaussian noise of 3 % of the depth is skewed in the disparity only.
     #[test]
     fn what_is_symmetric_in_the_depth_is_not_skewed() {
         const S: f64 = 0.03;
-        let normal = |rng: &mut Stream| -> f64 { StandardNormal.sample(rng) };
-        let in_disparity = views("depth", S, |rng| -> f64 {
-            let x = normal(rng);
-            x / (1.0 - S * x)
-        });
+        let in_disparity = drawn("depth", S, |_, rng| gaussian_in_depth(S, rng));
         let told = in_disparity[0].skewness().unwrap();
         assert!(told[0] > 0.12 && told[1].abs() < 0.06, "{told:?}");
         assert!(skewness(&in_disparity, 1e-3).is_none());

@@ -54,9 +54,8 @@ pub struct Structure {
     pub tails: TailCounts,
     /// The places where such lie.
     pub far_places: f64,
-    /// Of the residuals near the middle, for tails too weak to count: of the disparity and, where the
-    /// noise is large enough for it to differ, of the depth.
-    pub moments: Vec<Moments>,
+    /// Of the residuals near the middle, for tails too weak to count.
+    pub moments: Moments,
     /// Mean standard deviation of the disparity over the disparity.
     pub relative_sigma: f64,
 }
@@ -67,10 +66,12 @@ impl Structure {
         (self.tails.n > FEWEST_READINGS).then(|| self.tails.share())
     }
 
-    /// Excess kurtosis of the disparity, and of the depth where that differs.
+    /// Excess kurtosis of the disparity, and of the depth: of an error e of the disparity d that is e / (1 + e / d), to
+    /// second order of the noise's size over d.
     pub fn excess(&self) -> Option<[f64; 2]> {
-        let disparity = self.moments.first()?.excess()?;
-        Some([disparity, self.moments.get(1).map_or(Some(disparity), Moments::excess)?])
+        let (disparity, skewness) = (self.moments.excess()?, self.moments.skewness()?);
+        let s = self.relative_sigma;
+        Some([disparity, disparity + 24.0 * s * (3.0 * s - skewness)])
     }
 
     /// Pixels that a square of the noise is shared by: the squared correlation of a box sums to this.
@@ -81,7 +82,7 @@ impl Structure {
 
     /// Skewness of the disparity, and of the depth: of noise of s times the disparity 6 s less.
     pub fn skewness(&self) -> Option<[f64; 2]> {
-        let disparity = self.moments.first()?.skewness()?;
+        let disparity = self.moments.skewness()?;
         Some([disparity, disparity - 6.0 * self.relative_sigma])
     }
 

@@ -164,10 +164,8 @@ fn mean_size(counts: &TailCounts) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::noise::moments::Moments;
-    use crate::diagnose::noise::tail_counts::tail;
-    use crate::rng::Seed;
-    use rand_distr::{Distribution, StandardNormal, StudentT};
+    use crate::diagnose::noise::tests::{drawn, gaussian_in_depth, normal};
+    use rand_distr::{Distribution, StudentT};
 
     const VIEWS: usize = 14;
 
@@ -220,34 +218,17 @@ mod tests {
     /// noise is uneven anyway, or a simulation's; a Gaussian and a Gaussian of uneven size are not.
     #[test]
     fn weak_tails_are_seen_by_the_fourth_moment() {
-        const SIZE: [usize; 2] = [200, 150];
         let student = StudentT::new(80.0).expect("a distribution");
-        let views = |stream: &str, heavy: bool, uneven: f64| -> Vec<Structure> {
-            let mut rng = Seed(11).stream(stream);
-            let view = |_| {
-                let mut pixel = |i: usize| -> f32 {
-                    let x: f64 = if heavy {
-                        student.sample(&mut rng)
-                    } else {
-                        StandardNormal.sample(&mut rng)
-                    };
-                    (x * (1.0 + uneven * ((i % SIZE[0]) as f64 / 25.0).sin())) as f32
-                };
-                let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(&mut pixel).collect();
-                Structure {
-                    tails: tail(&image, SIZE[0], &mut vec![false; image.len()]),
-                    moments: vec![Moments::of(&image, SIZE[0])],
-                    ..Structure::default()
-                }
-            };
-            (0..VIEWS).map(view).collect()
+        let heavy = |s: f64| drawn("student", s, |_, rng| student.sample(rng));
+        let gaussian = |uneven: f64| {
+            let size = move |i: usize| 1.0 + uneven * ((i % 200) as f64 / 25.0).sin();
+            drawn("gaussian", 0.0, move |i, rng| size(i) * normal(rng))
         };
         let told = |views: &[Structure], uneven: bool, simulated: bool| {
             let confusers = Confusers { uneven, simulated, stepped: false };
             tails(views, &KnownTerms::default(), 1e-3, confusers)
         };
-        let heavy = views("student", true, 0.0);
-        let found = told(&heavy, false, false).expect("weak tails");
+        let found = told(&heavy(0.0), false, false).expect("weak tails");
         assert_eq!(found.families, ["heavy-tails"]);
         let [fraction, scale, excess] = ["fraction", "scale", EXCESS]
             .map(|name| found.parameters[name]["value"].as_f64().expect("a number"));
@@ -255,20 +236,20 @@ mod tests {
         let x = fraction * (scale * scale - 1.0);
         let had = 3.0 * (1.0 - fraction) / fraction * (x / (1.0 + x)).powi(2);
         assert!((had / excess - 1.0).abs() < 1e-3, "{had} {excess}");
-        let in_depth = |other: &[Structure]| -> Vec<Structure> {
-            let both = |(h, o): (&Structure, &Structure)| Structure {
-                moments: [h.moments.clone(), o.moments.clone()].concat(),
-                ..h.clone()
-            };
-            heavy.iter().zip(other).map(both).collect()
+        // Of noise that is no small part of the depth, in that as well.
+        const S: f64 = 0.035;
+        assert!(told(&heavy(S), false, false).is_some());
+        let in_depth = |s: f64| {
+            let mut views = drawn("tails/depth", s, |_, rng| gaussian_in_depth(S, rng));
+            views.iter_mut().for_each(|v| v.tails.beyond = GAUSSIAN_TAIL * v.tails.n);
+            views
         };
-        assert!(told(&in_depth(&heavy), false, false).is_some());
-        let gaussian = views("gaussian", false, 0.0);
-        assert!(told(&in_depth(&gaussian), false, false).is_none(), "Gaussian in the depth");
-        assert!(told(&heavy, true, false).is_none(), "of a noise that is uneven anyway");
-        assert!(told(&heavy, false, true).is_none(), "of a simulation");
+        assert!(told(&in_depth(0.0), false, false).is_some());
+        assert!(told(&in_depth(S), false, false).is_none(), "Gaussian in the depth");
+        assert!(told(&heavy(0.0), true, false).is_none(), "of a noise that is uneven anyway");
+        assert!(told(&heavy(0.0), false, true).is_none(), "of a simulation");
         assert!(told(&[], false, false).is_none());
-        assert!(told(&views("gaussian", false, 0.0), false, false).is_none());
-        assert!(told(&views("uneven", false, 0.3), false, false).is_none());
+        assert!(told(&gaussian(0.0), false, false).is_none());
+        assert!(told(&gaussian(0.3), false, false).is_none());
     }
 }

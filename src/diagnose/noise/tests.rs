@@ -7,6 +7,8 @@ use serde_json::{Map, json};
 use super::*;
 use crate::diagnose::noise::frame_series::Jitter;
 use crate::diagnose::noise::in_time::still_share;
+use crate::diagnose::noise::moments::Moments;
+use crate::diagnose::noise::tail_counts::tail;
 use crate::model::{Effect, NoiseModel};
 use crate::rng::{Seed, Stream};
 use crate::simulate::kinect_v1;
@@ -16,7 +18,7 @@ const LEVEL: f64 = 1e-3;
 /// Relative scatter of a view's statistic.
 const SCATTER: f64 = 0.02;
 
-fn normal(rng: &mut Stream) -> f64 {
+pub(super) fn normal(rng: &mut Stream) -> f64 {
     StandardNormal.sample(rng)
 }
 
@@ -50,6 +52,34 @@ pub(super) fn with(rng: &mut Stream, add: impl FnMut(&mut Structure)) -> Vec<Str
     let mut views = plain(rng);
     views.iter_mut().for_each(add);
     views
+}
+
+/// Views whose errors are drawn pixel by pixel, of `relative_sigma` times the disparity.
+pub(super) fn drawn(
+    stream: &str,
+    relative_sigma: f64,
+    draw: impl Fn(usize, &mut Stream) -> f64,
+) -> Vec<Structure> {
+    const SIZE: [usize; 2] = [200, 150];
+    let mut rng = Seed(6).stream(stream);
+    let view = |_| {
+        let image: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(|i| draw(i, &mut rng) as f32).collect();
+        Structure {
+            pixels: image.len() as f64,
+            tails: tail(&image, SIZE[0], &mut vec![false; image.len()]),
+            moments: Moments::of(&image, SIZE[0]),
+            relative_sigma,
+            ..Structure::default()
+        }
+    };
+    (0..VIEWS).map(view).collect()
+}
+
+/// An error of `s` times the disparity that is Gaussian in the depth, in units of its size and about its mean, as the
+/// high pass leaves it.
+pub(super) fn gaussian_in_depth(s: f64, rng: &mut Stream) -> f64 {
+    let x = normal(rng);
+    x / (1.0 - s * x) - s
 }
 
 fn names(found: &[TextureFinding]) -> Vec<&'static str> {
