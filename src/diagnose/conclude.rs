@@ -68,11 +68,9 @@ impl Case<'_> {
         found.extend(cannot_tell.iter().map(not_identifiable));
         shares(&mut found);
         self.progress.stage("scoring views kept aside, and what would have been seen");
-        let left_out =
-            || rms::left_out(&self.survey, &mean.outcome, &mean.terms, &self.as_stored());
-        let (heldout, (map, mut detectable, left_out)) = rayon::join(
+        let (heldout, (map, mut detectable)) = rayon::join(
             || self.heldout(&mean.lines, &scatter),
-            || (self.map(&scenes, outcomes), self.detectable(&scenes, outcomes), left_out()),
+            || (self.map(&scenes, outcomes), self.detectable(&scenes, outcomes)),
         );
         drop(scenes);
         detectable.extend(detectable_losses);
@@ -110,7 +108,6 @@ impl Case<'_> {
             findings: found,
             map,
             heldout,
-            left_out,
             after,
             detectable,
             cannot_tell,

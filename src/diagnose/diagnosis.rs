@@ -22,8 +22,6 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     pub map: Vec<MapRow>,
     pub heldout: Option<HeldOut>,
-    /// Every view with the terms' coefficients fitted to the others, the shapes as chosen on all.
-    pub left_out: Option<LeftOut>,
     pub after: After,
     pub detectable: Vec<Detectable>,
     /// What this recording cannot tell, and what would.
@@ -240,16 +238,6 @@ pub struct HeldOut {
     /// The same with what `correct` takes out, and no more.
     pub correction_rms_before_px: f64,
     pub correction_rms_after_px: f64,
-}
-
-/// Root mean square of the residual to a plane, every pixel of every frame of every view, px.
-#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-pub struct LeftOut {
-    pub rms_px_before: f64,
-    pub rms_px_after: f64,
-    /// The mean over the views of each view's own.
-    pub mean_of_views_px_before: f64,
-    pub mean_of_views_px_after: f64,
 }
 
 /// The battery once more, against the extended model.

@@ -3,13 +3,11 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::diagnose::diagnosis::LeftOut;
-use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::diagnose::views::tiles::Tile;
 use crate::solve::plane_through;
-use crate::terms::{PixelContext, Term, by_term};
+use crate::terms::{PixelContext, Term};
 
 /// Root mean square of every pixel of every frame, px, the sum of squares being so much less by lines, and of the
 /// smooth residual, mm.
@@ -85,45 +83,4 @@ pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
             (sum / f64::max(n, 1.0)).sqrt()
         })
         .collect()
-}
-
-/// Every view with coefficients fitted without it, the shapes as chosen on all: root mean square of
-/// every pixel of every frame to a plane, px, before, as `stored`, and after.
-pub fn left_out(
-    survey: &Survey,
-    outcome: &Outcome,
-    terms: &[Term],
-    stored: &[Term],
-) -> Option<LeftOut> {
-    let (mut sums, mut n) = ([0.0; 2], 0.0);
-    let mut by_view = [0.0; 2];
-    for (v, view) in survey.views.iter().enumerate() {
-        let fitted_without: &[f64] =
-            match outcome.left_out.iter().find(|(views, _)| views.contains(&v)) {
-                Some((_, beta)) => beta,
-                None if terms.is_empty() => &[],
-                None => return None,
-            };
-        let refitted: Vec<Term> = by_term(terms, fitted_without)
-            .map(|(t, mine)| Term { coefficients: mine.to_vec(), ..t.clone() })
-            .collect();
-        let pixels: f64 = view.tiles.iter().filter(|t| t.mean.is_finite()).map(|t| t.pixels).sum();
-        let both = sums.iter_mut().zip(&mut by_view).zip([stored, &refitted]);
-        for ((sum, by_view), terms) in both {
-            let before = *sum;
-            each_patch(view, terms, |(_, t), f| {
-                *sum += squares_about(t, f);
-            });
-            *by_view += ((*sum - before) / pixels.max(1.0)).sqrt();
-        }
-        n += pixels;
-    }
-    let [before, after] = sums.map(|s| (s / n).sqrt());
-    let [mean_before, mean_after] = by_view.map(|s| s / survey.views.len() as f64);
-    Some(LeftOut {
-        rms_px_before: before,
-        rms_px_after: after,
-        mean_of_views_px_before: mean_before,
-        mean_of_views_px_after: mean_after,
-    })
 }

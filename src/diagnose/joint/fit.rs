@@ -71,7 +71,6 @@ impl Reduced {
 pub struct Joint<'a> {
     pub columns: &'a Columns,
     pub data: &'a [ViewData],
-    pub views: Vec<Vec<usize>>,
     parts: Vec<Evidence>,
     pub all: Evidence,
     /// Of either half of the views.
@@ -100,7 +99,7 @@ impl<'a> Joint<'a> {
         let halves = [0, 1].map(|half| Evidence::sum(n, 0.0, each.iter().skip(half).step_by(2)));
         let parts: Vec<Evidence> = each.chunks(2).map(|both| Evidence::sum(n, 0.0, both)).collect();
         let all = Evidence::sum(n, 0.0, &halves);
-        Joint { columns, data, views, parts, all, halves }
+        Joint { columns, data, parts, all, halves }
     }
 
     /// What each view of these says beyond a fit, its plane profiled out: the score that is left.

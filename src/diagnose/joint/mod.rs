@@ -113,10 +113,6 @@ impl Joint<'_> {
             || self.halves(second, s, &precision, &beta),
             || is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten(),
         );
-        let folds = s.without.iter().zip(&self.views);
-        let left_out = folds.filter_map(|(r, views)| {
-            Some((views.clone(), self.reported(s, &r.fit(&kept, &precision)?)))
-        });
         let told = self.reported(s, &beta);
         let fit = Gain {
             total: total(&s.scores),
@@ -131,7 +127,6 @@ impl Joint<'_> {
             noise: found.noise.clone(),
             halves,
             covariance: error.map(|e| self.reported_error(s, &e)).unwrap_or_default(),
-            left_out: left_out.collect(),
             fit: Some(fit),
             ..Outcome::default()
         })

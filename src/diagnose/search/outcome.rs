@@ -54,8 +54,6 @@ pub struct Outcome {
     pub fit: Option<Gain>,
     pub evidence: Vec<Evidence>,
     pub noise: NoiseGains,
-    /// Coefficients as fitted without some views, for these views.
-    pub left_out: Vec<(Vec<usize>, Vec<f64>)>,
     /// All terms as either half of the views has them.
     pub halves: Option<Halves>,
     /// Of all coefficients.

@@ -108,7 +108,6 @@ fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
         verdict,
         findings,
         map: (0..if nothing { 0 } else { 15 }).map(row).collect(),
-        left_out: None,
         heldout: (!nothing).then_some(heldout),
         after: After { verdict: Verdict::Match, remaining: Vec::new() },
         detectable: vec![
