@@ -176,18 +176,7 @@ mod tests {
     fn the_level_of_a_view_is_as_sure_as_the_mean_of_its_readings() {
         const ACROSS: i32 = 20;
         let at = |k: i32| f64::from(2 * (k % ACROSS) + 1 - ACROSS);
-        let tile = Tile {
-            mean: 0.0,
-            square: 0.01,
-            rough_square: 0.01,
-            temporal: 0.01,
-            repeated: 1.0,
-            variance: 0.01,
-            noise_variance: 0.01,
-            pixels: 16.0,
-            missing: 0.0,
-            asked: 16.0,
-        };
+        let tile = Tile::of_noise(0.01, 16.0);
         let patches = (0..ACROSS * ACROSS).map(|k| {
             let (x, y) = (0.01 * at(k), 0.01 * at(k / ACROSS));
             (PixelContext { x, y, disparity: 20.0, variance: 0.01, ..Default::default() }, tile)

@@ -143,18 +143,8 @@ mod tests {
             let square = (2 * row / BLOCK_TILES + 2 * column / BLOCK_TILES) % 2;
             let light = [0.25, 2.0][square];
             let [u, v] = [column, row].map(|place| ((place * SIDE) as f64) + 1.5);
-            let tile = Tile {
-                mean: 0.0,
-                square: 1.0 / light,
-                rough_square: 0.0,
-                temporal: 1.0 / light,
-                repeated: 1.0,
-                variance: 1.0,
-                noise_variance: 1.0,
-                pixels: (SIDE * SIDE) as f64,
-                missing: 0.0,
-                asked: 1.0,
-            };
+            let noise = Tile::of_noise(1.0, (SIDE * SIDE) as f64);
+            let tile = Tile { temporal: 1.0 / light, ..noise };
             (PixelContext { u, v, light, ..PixelContext::default() }, tile)
         };
         let view = SurveyedView::white((0..ACROSS * ACROSS).map(patch), 3.0);

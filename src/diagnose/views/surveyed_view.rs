@@ -196,20 +196,10 @@ mod tests {
                     radius,
                     ..Default::default()
                 };
-                let tile = Tile {
-                    mean: disparity * (sigma_m / z).powi(2),
-                    square: variance,
-                    rough_square: variance,
-                    temporal: variance,
-                    repeated: 1.0,
-                    variance,
-                    noise_variance: variance,
-                    // Thirty frames.
-                    pixels: 30.0 * side * side,
-                    missing: 0.0,
-                    asked: 1.0,
-                };
-                patches.push((own, tile));
+                let mean = disparity * (sigma_m / z).powi(2);
+                // Thirty frames.
+                let noise = Tile::of_noise(variance, 30.0 * side * side);
+                patches.push((own, Tile { mean, ..noise }));
             }
         }
         SurveyedView::white(patches, 30.0)

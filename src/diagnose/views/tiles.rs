@@ -33,6 +33,25 @@ pub struct Tile {
     pub asked: f64,
 }
 
+#[cfg(test)]
+impl Tile {
+    /// Of white noise of this variance, px^2, all of it measured in every frame.
+    pub fn of_noise(variance: f64, pixels: f64) -> Self {
+        Tile {
+            mean: 0.0,
+            square: variance,
+            rough_square: variance,
+            temporal: variance,
+            repeated: 1.0,
+            variance,
+            noise_variance: variance,
+            pixels,
+            missing: 0.0,
+            asked: 1.0,
+        }
+    }
+}
+
 /// Side of a tile, px: small against a Kinect's window of 9 px, so that ripples of a few px are
 /// still seen.
 pub const SIDE: usize = 4;
