@@ -67,23 +67,6 @@ fn known_vignetting_grows_as_the_catalogue_says() {
     }
 }
 
-/// A stripe's teeth are as high as the amplitude says, one a period, and rise with the column.
-#[test]
-fn known_bands_have_their_period_and_height() {
-    let camera = kinect_v1(1).camera;
-    let entry = json!({"amplitude_px": 0.2, "period_px": 64.0});
-    let known = KnownTerms::of(&model("column-banding", entry), &camera);
-    let at = |u: usize| {
-        known.bias[0]
-            .value(&PixelContext { u: u as f64, ..PixelContext::default() }, &mut Vec::new())
-    };
-    let values: Vec<f64> = (0..camera.width).map(at).collect();
-    let [low, high] = crate::stats::range(values.iter().copied());
-    // The last step before a tooth's end is up to one column of 64 short of it.
-    assert!((0.5 * (high - low) - 0.2).abs() < 0.2 / 64.0 * 2.0, "{low} to {high}");
-    (0..camera.width - 64).for_each(|u| assert!((values[u] - values[u + 64]).abs() < 1e-9));
-}
-
 /// What has no formula is known by name alone; a shape of its own comes before the formula.
 #[test]
 fn what_has_no_formula_is_known_by_name() {
