@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::camera::Camera;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
+use crate::diagnose::views::samples::in_patches;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::diagnose::views::tiles::{SIDE, rim_px};
 use crate::terms::PixelContext;
@@ -46,31 +47,25 @@ const FEWEST_TILES: usize = 2;
 pub fn patches(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Patch>> {
     let side = (camera.width.div_ceil(ACROSS * SIDE) * SIDE) as f64;
     let rim = rim_px(camera);
-    survey
-        .views
-        .iter()
-        .map(|view| {
-            let mut groups: BTreeMap<(u32, u32, bool), Vec<usize>> = BTreeMap::new();
-            for (i, p) in view.places.iter().enumerate().filter(|(_, p)| margins.hold(p)) {
-                let key = ((p.v / side) as u32, (p.u / side) as u32, p.edge < rim);
-                groups.entry(key).or_default().push(i);
-            }
-            groups
-                .values()
-                .filter(|g| g.len() >= FEWEST_TILES)
-                .map(|group| {
-                    let sum = |of: &dyn Fn(usize) -> f64| group.iter().map(|&i| of(i)).sum::<f64>();
-                    let asked = sum(&|i| view.tiles[i].asked);
-                    let lost = sum(&|i| view.tiles[i].asked * view.tiles[i].missing);
-                    let mut place = view.places[group[0]];
-                    place
-                        .average(&view.places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
-                    place.side = side;
-                    Patch { place, lost, asked }
-                })
-                .collect()
-        })
-        .collect()
+    let of_view = |view: &SurveyedView| {
+        let apart = |i: usize| {
+            let place = &view.places[i];
+            margins.hold(place).then_some(place.edge < rim)
+        };
+        let of_group = |group: Vec<usize>| {
+            let sum = |of: &dyn Fn(usize) -> f64| group.iter().map(|&i| of(i)).sum::<f64>();
+            let asked = sum(&|i| view.tiles[i].asked);
+            let lost = sum(&|i| view.tiles[i].asked * view.tiles[i].missing);
+            let mut place = view.places[group[0]];
+            place.average(&view.places, &|of| sum(&|i| view.tiles[i].asked * of(i)) / asked);
+            place.side = side;
+            Patch { place, lost, asked }
+        };
+        let mut groups = in_patches(&view.places, side, apart);
+        groups.retain(|group| group.len() >= FEWEST_TILES);
+        groups.into_iter().map(of_group).collect()
+    };
+    survey.views.iter().map(of_view).collect()
 }
 
 /// Which cell of its picture it is.

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::box_sums::SMOOTH_PX;
-use super::samples::ViewData;
+use super::samples::{ViewData, in_patches};
 use super::surveyed_view::SurveyedView;
-use super::tiles::{SIDE, Tile};
+use super::tiles::SIDE;
 use crate::stats::median;
-use crate::terms::{DARKEST, PixelContext};
+use crate::terms::DARKEST;
 
 /// Widest side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
 pub const BLOCK_TILES: usize = 6;
@@ -40,24 +40,37 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
     let first = view.places.first().map_or(1.0, |p| p.light);
     let lit = by_light && view.places.iter().any(|p| p.light != first);
     let least = if lit { LEAST_LIT } else { LEAST } * side * side;
-    let mut sums: std::collections::BTreeMap<(u32, u32, i32), Sum> = Default::default();
-    for (place, t) in view.patches() {
-        let octave = if lit { place.light.max(DARKEST).log2().floor() as i32 } else { 0 };
-        let key = ((place.v / side) as u32, (place.u / side) as u32, octave);
-        sums.entry(key).or_default().add(place, t, view.between_frame_factor);
-    }
+    // With frames to compare, only what changes is noise; its still part is put back by what frames have in
+    // common.
+    let noise = |i: usize| match (&view.tiles[i], view.between_frame_factor) {
+        (t, Some(factor)) => (t.temporal * factor, t.repeated),
+        (t, None) => (t.temporal + t.rough_square, 1.0),
+    };
+    let octave =
+        |i: usize| if lit { view.places[i].light.max(DARKEST).log2().floor() as i32 } else { 0 };
+    let is_measured = |i: usize| view.tiles[i].pixels > 0.0 && noise(i).0.is_finite();
+    let groups = in_patches(&view.places, side, |i| is_measured(i).then(|| octave(i)));
     // What the box's mean took with it.
     let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
     let kept = if view.between_frame_factor.is_some() { 1.0 } else { 1.0 - taken };
     let mut blocks = ViewData { precision: vec![0.0], ..ViewData::default() };
-    for s in sums.values() {
-        if s.n < least || s.ratio <= 0.0 {
+    for group in groups {
+        let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
+            group.iter().map(|&i| view.tiles[i].pixels * of(i)).sum()
+        };
+        let (n, repeated) = (sum(&|_| 1.0), sum(&|i| noise(i).1));
+        let ratio = sum(&|i| noise(i).1 * noise(i).0 / view.tiles[i].noise_variance);
+        if n < least || ratio <= 0.0 {
             continue;
         }
-        let worth = s.repeated * view.frames / view.correlation.sum_of_squares;
-        Arc::make_mut(&mut blocks.places).push(s.place);
+        let worth = repeated * view.frames / view.correlation.sum_of_squares;
+        let mut place = view.places[group[0]];
+        place.average(&view.places, &|of| sum(of) / n);
+        // Variances add up, and where light is what they come from they are as its inverse (shot noise).
+        place.light = n / sum(&|i| 1.0 / view.places[i].light);
+        Arc::make_mut(&mut blocks.places).push(place);
         // The mean of log chi^2 / n is about -1 / n.
-        blocks.response.push((s.ratio / s.repeated / kept.max(0.5)).ln() + 1.0 / worth);
+        blocks.response.push((ratio / repeated / kept.max(0.5)).ln() + 1.0 / worth);
         blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.log_variance_inflation);
         blocks.nuisance.push(1.0);
     }
@@ -69,55 +82,11 @@ const LEAST: f64 = 0.5;
 /// The same where a block falls into parts by their light.
 const LEAST_LIT: f64 = 0.125;
 
-#[derive(Default)]
-struct Sum {
-    place: PixelContext,
-    n: f64,
-    /// Those whose frames could be compared, where frames are.
-    repeated: f64,
-    ratio: f64,
-}
-
-impl Sum {
-    fn add(&mut self, at: &PixelContext, t: &Tile, between_frame_factor: Option<f64>) {
-        // With frames to compare, only what changes is noise; its still part is put back by what
-        // frames have in common.
-        let (square, repeated) = match between_frame_factor {
-            Some(factor) => (t.temporal * factor, t.repeated),
-            None => (t.temporal + t.rough_square, 1.0),
-        };
-        if !square.is_finite() {
-            return;
-        }
-        if self.n == 0.0 {
-            self.place = *at;
-        }
-        self.n += t.pixels;
-        self.repeated += t.pixels * repeated;
-        self.ratio += t.pixels * repeated * square / t.noise_variance;
-        // The block lies where its tiles do on average; what is one for the view stays.
-        let share = t.pixels / self.n;
-        let mix = |a: &mut f64, b: f64| *a += share * (b - *a);
-        let p = &mut self.place;
-        mix(&mut p.u, at.u);
-        mix(&mut p.v, at.v);
-        mix(&mut p.x, at.x);
-        mix(&mut p.y, at.y);
-        mix(&mut p.z, at.z);
-        mix(&mut p.disparity, at.disparity);
-        mix(&mut p.radius, at.radius);
-        mix(&mut p.right, at.right);
-        mix(&mut p.down, at.down);
-        mix(&mut p.variance, at.variance);
-        mix(&mut p.edge, at.edge);
-        // Variances add up, and where light is what they come from they are as its inverse (shot noise).
-        p.light = 1.0 / (1.0 / p.light + share * (1.0 / at.light - 1.0 / p.light));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::views::tiles::Tile;
+    use crate::terms::PixelContext;
 
     /// As large a part of the picture, but no fewer independent samples than a variance needs.
     #[test]

@@ -1,5 +1,6 @@
 //! The samples that a search works on.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -83,14 +84,26 @@ pub fn smooth_px(width: usize) -> f64 {
     ((width / PATCHES_ACROSS / SIDE * SIDE) as f64).max(COARSE_PX)
 }
 
+/// The places of each patch of this side, px, row by row; what is to lie `apart` is in patches of its own, and
+/// `None` in none.
+pub fn in_patches<K: Ord>(
+    places: &[PixelContext],
+    side: f64,
+    apart: impl Fn(usize) -> Option<K>,
+) -> Vec<Vec<usize>> {
+    let mut patches: BTreeMap<(u32, u32, K), Vec<usize>> = BTreeMap::new();
+    for (i, place) in places.iter().enumerate() {
+        let Some(own) = apart(i) else { continue };
+        let key = ((place.v / side) as u32, (place.u / side) as u32, own);
+        patches.entry(key).or_default().push(i);
+    }
+    patches.into_values().collect()
+}
+
 /// Tiles made one in patches of this side, px.
 pub fn coarser(fine: &ViewData, side: f64) -> ViewData {
     let p = fine.precision.len();
-    let mut groups: std::collections::BTreeMap<(u32, u32), Vec<usize>> = Default::default();
-    for (i, place) in fine.places.iter().enumerate() {
-        let key = ((place.v / side) as u32, (place.u / side) as u32);
-        groups.entry(key).or_default().push(i);
-    }
+    let groups = in_patches(&fine.places, side, |_| Some(()));
     let mut coarse = ViewData {
         places: Arc::default(),
         response: Vec::with_capacity(groups.len()),
@@ -100,7 +113,7 @@ pub fn coarser(fine: &ViewData, side: f64) -> ViewData {
         gathered: vec![0; fine.places.len()],
     };
     let mut places = Vec::with_capacity(groups.len());
-    for (k, members) in groups.values().enumerate() {
+    for (k, members) in groups.iter().enumerate() {
         members.iter().for_each(|&i| coarse.gathered[i] = k as u32);
         let weight: f64 = members.iter().map(|&i| fine.weight[i]).sum();
         let mean = |of: &dyn Fn(usize) -> f64| {
