@@ -97,7 +97,7 @@ impl Case<'_> {
         let (after, mut done) = match tested {
             // Where nothing was found the model is the extended one, and was tested.
             Some(verdict) => (After { verdict, remaining: Vec::new() }, self),
-            None => self.after(&extended, &mean, explained),
+            None => self.after(&extended, explained),
         };
         done.fields.iter_mut().for_each(|f| f.first.clear());
         let diagnosis = Diagnosis {

@@ -3,31 +3,25 @@
 //! losses and the words' steps, is the first run's.
 
 use crate::diagnose::battery::Battery;
-use crate::diagnose::case::{Case, MeanResult};
+use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::{After, Finding, Remaining};
 use crate::diagnose::finding::pixels::pixel_terms;
 use crate::diagnose::verdict::verdict;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::model::{Effect, NoiseModel};
-use crate::terms::Term;
 
 impl<'a> Case<'a> {
     /// What stands out against `extended`, and the views with their means as they were; the first run
     /// `explained` so many nats.
-    pub fn after<'b>(
-        mut self,
-        extended: &'b NoiseModel,
-        mean: &MeanResult,
-        explained: f64,
-    ) -> (After, Case<'b>)
+    pub fn after<'b>(mut self, extended: &'b NoiseModel, explained: f64) -> (After, Case<'b>)
     where
         'a: 'b,
     {
         self.progress.stage("testing the extended model");
         let added = self.added(extended);
         let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
-        let bias = self.bias_px(&added.bias, mean);
+        let bias = pixel_terms(&self.fields, &added.bias, &self.survey, &self.bench);
         let spread = pixel_terms(&self.fields, &added.variance, &self.survey, &self.bench);
         let mut fields = std::mem::take(&mut self.fields);
         for (n, field) in fields.iter_mut().enumerate() {
@@ -51,26 +45,6 @@ impl<'a> Case<'a> {
         beyond.effects.drain(..self.model.effects.len());
         beyond.effects.retain(|e| !read(e));
         KnownTerms::of(&beyond, &self.sensor().camera)
-    }
-
-    /// Terms at every pixel, px: as the search left them but for those that were not told, and for
-    /// what other layers learnt.
-    fn bias_px(&self, terms: &[Term], mean: &MeanResult) -> Vec<Vec<f32>> {
-        let beyond = |all: &[Term], others: &[Term], sign: f64| -> Vec<Term> {
-            all.iter().filter(|t| !others.contains(t)).map(|t| t.times(sign)).collect()
-        };
-        let known = mean.all_terms();
-        let mut differ = beyond(terms, &known, 1.0);
-        differ.extend(beyond(&known, terms, -1.0));
-        let mut all = mean.px.clone();
-        let more = pixel_terms(&self.fields, &differ, &self.survey, &self.bench);
-        if all.is_empty() {
-            return more;
-        }
-        for (sum, more) in all.iter_mut().zip(more) {
-            sum.iter_mut().zip(more).for_each(|(s, m)| *s += m);
-        }
-        all
     }
 }
 
