@@ -38,18 +38,6 @@ pub fn halves(poses: &[(f64, f64)]) -> Vec<bool> {
 }
 
 impl ViewMean {
-    /// Of a single column, by each view's information and score; errors from the views' scatter
-    /// where that is the larger.
-    pub fn of_scores(views: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
-        let all: Vec<(f64, f64)> = views.filter(|(a, _)| *a > 0.0).collect();
-        let (a, b) = all.iter().fold((0.0, 0.0), |sum, v| (sum.0 + v.0, sum.1 + v.1));
-        let value = b / a;
-        let left: f64 = all.iter().map(|(own, score)| (score - value * own).powi(2)).sum();
-        let n = all.len() as f64;
-        let variance = (left * n / (n - 1.0) / (a * a)).max(1.0 / a);
-        (n > 1.0).then_some(ViewMean { value, std_error: variance.sqrt(), views: n })
-    }
-
     fn z(&self) -> f64 {
         self.value / self.std_error
     }

@@ -124,12 +124,3 @@ fn sizes_that_differ_do_not_agree() {
     assert_eq!(agree([size(1.0, 0.1), size(-1.0, 0.9)]), Some(false), "other sign");
     assert_eq!(agree([size(1.0, 0.1), None]), None);
 }
-
-/// By hand: three views of information one that say 1, 2 and 3 have a mean of 2 and a clustered
-/// variance of 2 / 3 * 3 / 2 / 3.
-#[test]
-fn a_size_has_the_scatter_of_its_views() {
-    let m = ViewMean::of_scores([(1.0, 1.0), (1.0, 2.0), (1.0, 3.0)].into_iter()).unwrap();
-    approx::assert_relative_eq!(m.value, 2.0);
-    approx::assert_relative_eq!(m.std_error, (1f64 / 3.0).sqrt(), max_relative = 1e-12);
-}

@@ -4,9 +4,8 @@ use nalgebra::DVector;
 
 use super::referenced_view::{ReferencedView, Scatter, is_tilted};
 use super::warm_up::warm_up;
-use crate::diagnose::checks::replication::agree;
+use crate::diagnose::checks::replication::Halves;
 use crate::diagnose::joint::anchor::Family;
-use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::null::Null;
 use crate::terms::Axis;
@@ -103,16 +102,8 @@ impl<'a> References<'a> {
             let squares: f64 = (0..checked.len()).map(|n| of(n).powi(2)).sum();
             (squares / checked.len() as f64).sqrt()
         };
-        // The others as all references have them.
-        let half = |second: bool| {
-            let mine = (0..checked.len()).filter(|&n| checked[n].in_second_half == second);
-            ViewMean::of_scores(mine.map(|n| {
-                let others = gain.beta.iter().zip(&self.others[n]).map(|(size, o)| size * o);
-                let left = checked[n].off - others.sum::<f64>();
-                let variance = self.scatter.variances[n];
-                (moves[n] * moves[n] / variance, moves[n] * left / variance)
-            }))
-        };
+        let second: Vec<bool> = checked.iter().map(|c| c.in_second_half).collect();
+        let halves = Halves::of(&views, &second, PRIOR, &vec![1; beside + 1]);
         Some(Law {
             family,
             axis,
@@ -128,7 +119,7 @@ impl<'a> References<'a> {
             estimate: [beta, gain.covariance[(beside, beside)].sqrt()],
             null: Null::of(&views, beside, PRIOR)?,
             freedom: self.scatter.freedom.max(1.0),
-            replicated: agree([half(false), half(true)]),
+            replicated: halves.and_then(|h| h.replicate_beside(&[beside])),
         })
     }
 }

@@ -6,8 +6,7 @@ use rayon::prelude::*;
 
 use super::cells::{Cell, Scatter, USUAL, Whitener, odds, share};
 use super::shapes::{Shape, Step, begun};
-use crate::diagnose::checks::replication::{Halves, agree};
-use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::checks::replication::Halves;
 use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::Null;
@@ -188,12 +187,10 @@ impl<'a> Losses<'a> {
         match &judged.shape {
             Shape::Step(step) => {
                 let (a, b) = self.information_and_score(*step);
-                let half = |which: bool| {
-                    let views = a.iter().zip(&b).zip(second);
-                    let mine = views.filter(|(_, s)| **s == which);
-                    ViewMean::of_scores(mine.map(|((a, b), _)| (*a, *b)))
-                };
-                agree([half(false), half(true)])
+                let views = a.into_iter().zip(b).zip(second).filter(|((a, _), _)| *a > 0.0);
+                let (views, second): (Vec<_>, Vec<_>) =
+                    views.map(|((a, b), second)| (Evidence::of_one(a, b), *second)).unzip();
+                Halves::of(&views, &second, 0.0, &[1])?.replicate(&[0], 0.0)
             }
             Shape::Curve(basis) => {
                 let evidence = self.evidence(basis);

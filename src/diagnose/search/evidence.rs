@@ -25,6 +25,11 @@ impl Evidence {
         Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
     }
 
+    /// On a single column.
+    pub fn of_one(a: f64, b: f64) -> Self {
+        Evidence { a: DMatrix::from_element(1, 1, a), b: DVector::from_element(1, b) }
+    }
+
     /// On the first `n` columns alone.
     pub fn truncate(&mut self, n: usize) {
         if n < self.b.len() {
