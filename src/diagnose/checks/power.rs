@@ -18,7 +18,6 @@ use crate::diagnose::finding::scene::Scene;
 use crate::diagnose::search::LEAST_SHARE_OF_GAIN;
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::{Evidence, gain, root};
-use crate::diagnose::search::judge::{CLEARLY_FIXED, LEAST_OF_LARGEST};
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::search::prepared::evidence_of_bases;
@@ -96,7 +95,8 @@ impl DetectionCriteria<'_> {
             prior: self.rules.prior,
             sum: &sum,
         };
-        let floor = self.min_rms(&unit.basis);
+        let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
+        let floor = self.rules.min_rms(&unit.basis, largest);
         let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
         let sizes: Option<Vec<f64>> = (0..REPLICATES)
             .into_par_iter()
@@ -117,16 +117,6 @@ impl DetectionCriteria<'_> {
         let found = terms_of(self.outcome, self.scene.statistic);
         let left = |view: &ViewData| ViewData { response: view.without(&found), ..view.clone() };
         self.scene.data.iter().map(left).collect()
-    }
-
-    /// Root mean square that a fit must have, in the response's unit.
-    fn min_rms(&self, basis: &Basis) -> f64 {
-        let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
-        let still =
-            self.rules.fixed.filter(|_| basis.is_of_picture()).map_or(0.0, |(fixed, px)| {
-                fixed * (CLEARLY_FIXED * basis.count() as f64 / px).sqrt()
-            });
-        (LEAST_OF_LARGEST * largest).max(still)
     }
 }
 

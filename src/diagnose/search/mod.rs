@@ -32,7 +32,7 @@ use crate::terms::Basis;
 use candidate::Candidate;
 use choose::Choice;
 use evidence::{Evidence, fit, gain};
-use judge::{Judge, Judged, looks};
+use judge::{Judged, looks};
 use noise_gains::NoiseGains;
 use null::{Null, beside_chosen};
 use outcome::{Chosen, Look, Outcome, bases, bases_where};
@@ -171,8 +171,7 @@ impl<'a> Layer<'a> {
         };
         let Layer { rules, largest, .. } = *self;
         let weight = self.together.coarse.iter().flat_map(|v| &v.weight).sum();
-        let judge = Judge { weight, rules, largest };
-        Some(Trial { beside, views, settled, base, judge })
+        Some(Trial { beside, views, settled, base, weight, rules, largest })
     }
 
     /// The best candidate beside `chosen` and what is pinned, if it brings more than noise can.

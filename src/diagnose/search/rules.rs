@@ -1,6 +1,14 @@
 //! What a search decides by.
 
 use crate::diagnose::views::learnt::Learnt;
+use crate::terms::Basis;
+
+/// A later term must be this large beside the largest, root mean square by root mean square.
+const LEAST_OF_LARGEST: f64 = 0.06;
+/// A pattern that stands still must be, in square, so much more than what a fit to nothing but the
+/// pixels' own errors would make: seven times, for the best of many and for views that cover little
+/// of the picture.
+const CLEARLY_FIXED: f64 = 50.0;
 
 /// How a search decides.
 #[derive(Debug, Clone, Copy)]
@@ -26,4 +34,15 @@ pub struct Rules {
     /// Views that the model was learnt from, where these views are not among them: its own error is
     /// theirs scattered about their mean, and stands beside the error of these.
     pub learnt_from: Option<Learnt>,
+}
+
+impl Rules {
+    /// Root mean square that a fit must have beside that of the `largest` term.
+    pub fn min_rms(&self, basis: &Basis, largest: f64) -> f64 {
+        let still = |(fixed, pixels): (f64, f64)| {
+            fixed * (CLEARLY_FIXED * basis.count() as f64 / pixels).sqrt()
+        };
+        let still = self.fixed.filter(|_| basis.is_of_picture()).map_or(0.0, still);
+        still.max(LEAST_OF_LARGEST * largest)
+    }
 }

@@ -1,11 +1,14 @@
 //! Candidates tried beside what was chosen.
 
+use nalgebra::DVector;
+
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, gain};
-use super::judge::{Judge, Judged, own};
+use super::judge::{Judged, own};
 use super::null::{Null, beside_chosen};
 use super::outcome::Chosen;
 use super::prepared::{Patches, Prepared};
+use super::rules::Rules;
 use crate::terms::Basis;
 
 /// Candidates are tried on this.
@@ -19,7 +22,11 @@ pub struct Trial<'a> {
     /// the others a free surface goes anywhere where one view reaches farther than they do, and what bends
     /// it back would seem to be found.
     pub base: Option<[Gain; 2]>,
-    pub judge: Judge<'a>,
+    /// Weight of all samples.
+    pub weight: f64,
+    pub rules: &'a Rules,
+    /// Root mean square of the largest term so far.
+    pub largest: f64,
 }
 
 impl Trial<'_> {
@@ -47,7 +54,7 @@ impl Trial<'_> {
     }
 
     fn judged_by(&self, c: &Candidate, evidence: &[Evidence]) -> Option<Judged> {
-        let (m, prior) = (self.settled, self.judge.rules.prior);
+        let (m, prior) = (self.settled, self.rules.prior);
         let alone = beside_chosen(evidence, m, prior)?;
         let null = Null::of_candidate(&alone, prior)?;
         let gain = match &self.base {
@@ -60,9 +67,18 @@ impl Trial<'_> {
         if !c.agrees(own(&gain, &c.basis)) {
             return None;
         }
-        let rms = self.judge.rms(&c.basis, m, &gain, evidence);
-        let sensible = self.judge.sensible(&c.basis, rms);
+        let rms = self.rms(own(&gain, &c.basis), evidence);
+        let sensible = rms >= self.rules.min_rms(&c.basis, self.largest);
         Some(Judged { gain, null, sensible, rms })
+    }
+
+    /// Root mean square of a candidate's fit over the samples, the nuisances taken out.
+    fn rms(&self, fit: &[f64], evidence: &[Evidence]) -> f64 {
+        let (m, k) = (self.settled, fit.len());
+        let beta = DVector::from_column_slice(fit);
+        let square: f64 =
+            evidence.iter().map(|e| beta.dot(&(e.a.view((m, m), (k, k)) * &beta))).sum();
+        (square / self.weight).max(0.0).sqrt()
     }
 }
 
