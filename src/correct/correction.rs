@@ -241,13 +241,12 @@ impl Correction {
         self.needs = Needs::of(self.terms.iter().map(|(t, _)| t));
         if !self.still_terms.is_empty() {
             let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
-            let mut scratch = Vec::new();
-            let mut sum = |i: usize| {
+            let sum = |i: usize| {
                 let place = pixels.place(i);
                 let all = self.still_terms.iter();
-                all.map(|t| t.value(&place, &mut scratch)).sum::<f64>() as f32
+                all.map(|t| t.value(&place)).sum::<f64>() as f32
             };
-            self.still = (0..self.camera.pixels()).map(&mut sum).collect();
+            self.still = (0..self.camera.pixels()).map(sum).collect();
         }
     }
 }

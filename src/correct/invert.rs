@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::correction::{Conditions, Correction, LearntTerm};
 use super::slopes::Slopes;
-use super::uncertainty::{Scratch, where_held};
+use super::uncertainty::where_held;
 use crate::error::{Error, Result};
 use crate::measure::ColumnSteps;
 use crate::plane::Plane;
@@ -31,10 +31,9 @@ impl Correction {
         let known = self.known(depth_m, conditions);
         let width = self.camera.width;
         depth_m.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            let mut scratch = Vec::new();
             for (u, z) in line.iter_mut().enumerate() {
                 if *z > 0.0 {
-                    *z = self.depth(row * width + u, *z, &known, &mut scratch) as f32;
+                    *z = self.depth(row * width + u, *z, &known) as f32;
                 }
             }
         });
@@ -51,9 +50,8 @@ impl Correction {
             return Ok(depth_m.iter().copied().map(f64::from).collect());
         }
         let known = self.known(depth_m, conditions);
-        let mut scratch = Vec::new();
         let one = |(i, &z): (usize, &f32)| match z > 0.0 {
-            true => self.depth(i, z, &known, &mut scratch),
+            true => self.depth(i, z, &known),
             false => f64::from(z),
         };
         Ok(depth_m.iter().enumerate().map(one).collect())
@@ -79,15 +77,15 @@ impl Correction {
     }
 
     /// The corrected depth of a pixel whose stored depth is `z`, m.
-    fn depth(&self, i: usize, z: f32, known: &Known<'_>, scratch: &mut Vec<f64>) -> f64 {
+    fn depth(&self, i: usize, z: f32, known: &Known<'_>) -> f64 {
         let steps = known.columns.get(i % self.camera.width).copied().unwrap_or(0.0);
         let measured = self.disparity(i, z, known.factor) - steps;
-        let d = self.solve(i, measured, known, scratch);
+        let d = self.solve(i, measured, known);
         if d > 0.0 { self.scale_px_m / d } else { f64::INFINITY }
     }
 
     /// The disparity that the terms turn into `measured`, px.
-    fn solve(&self, i: usize, measured: f64, known: &Known<'_>, scratch: &mut Vec<f64>) -> f64 {
+    fn solve(&self, i: usize, measured: f64, known: &Known<'_>) -> f64 {
         if self.terms.is_empty() || measured <= 0.0 {
             return measured;
         }
@@ -95,7 +93,7 @@ impl Correction {
         let mut d = measured;
         for _ in 0..MAX_ROUNDS {
             known.stand(&mut place, i, d);
-            let bias: f64 = known.terms.iter().map(|t| held(t, &place, scratch)).sum();
+            let bias: f64 = known.terms.iter().map(|t| held(t, &place)).sum();
             let next = measured - bias;
             if !next.is_finite() {
                 return measured;
@@ -125,13 +123,13 @@ impl Correction {
         let width = self.camera.width;
         let mut sigma = vec![f32::NAN; depth_m.len()];
         sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            let mut scratch = Scratch::default();
+            let mut parts = Vec::new();
             for (u, sigma) in line.iter_mut().enumerate() {
                 let z = f64::from(depth_m[row * width + u]);
                 if z > 0.0 && z.is_finite() {
                     let mut place = known.place(row * width + u);
                     known.stand(&mut place, row * width + u, self.scale_px_m / z);
-                    let px = self.uncertainty.variance(&place, &mut scratch).sqrt();
+                    let px = self.uncertainty.variance(&place, &mut parts).sqrt();
                     *sigma = (px * z * z / self.scale_px_m) as f32;
                 }
             }
@@ -155,10 +153,9 @@ impl Correction {
         let width = self.camera.width;
         let mut sigma = vec![f64::NAN; depth_m.len()];
         sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            let mut scratch = Vec::new();
             for (u, sigma) in line.iter_mut().enumerate() {
                 let (i, z) = (row * width + u, depth_m[row * width + u]);
-                let depth = if z > 0.0 { self.depth(i, z, &known, &mut scratch) } else { 0.0 };
+                let depth = if z > 0.0 { self.depth(i, z, &known) } else { 0.0 };
                 if !(depth > 0.0 && depth.is_finite()) {
                     continue;
                 }
@@ -166,7 +163,7 @@ impl Correction {
                 known.stand(&mut place, i, self.scale_px_m / depth);
                 let plain = self.sigma.axial_sigma(depth, place.theta);
                 place.variance = (plain * place.disparity / depth).powi(2);
-                let terms = variance().map(|t| held(t, &place, &mut scratch));
+                let terms = variance().map(|t| held(t, &place));
                 *sigma = plain * (0.5 * terms.sum::<f64>()).exp();
             }
         });
@@ -199,8 +196,8 @@ impl Correction {
 
 /// A term's value; what stands still in the picture and grows with the disparity is held where its
 /// learning ended.
-fn held((term, [low, high]): &LearntTerm, place: &PixelContext, row: &mut Vec<f64>) -> f64 {
-    term.value(&where_held(&term.basis, [*low, *high], place), row)
+fn held((term, [low, high]): &LearntTerm, place: &PixelContext) -> f64 {
+    term.value(&where_held(&term.basis, [*low, *high], place))
 }
 
 /// What is known of the places of one image.

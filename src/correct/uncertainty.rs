@@ -76,37 +76,19 @@ impl Uncertainty {
         self.shapes.is_empty()
     }
 
-    /// Variance at a place, px^2.
-    pub fn variance(&self, place: &PixelContext, scratch: &mut Scratch) -> f64 {
-        scratch.parts.clear();
-        scratch.parts.resize(self.parts.len(), 0.0);
+    /// Variance at a place, px^2. `parts` is scratch.
+    pub fn variance(&self, place: &PixelContext, parts: &mut Vec<f64>) -> f64 {
+        parts.clear();
+        parts.resize(self.parts.len(), 0.0);
         let mut own = 0.0;
-        for Spread { term: (term, learnt), parts, own: variances } in &self.shapes {
-            let at = where_held(&term.basis, *learnt, place);
-            scratch.row.clear();
-            scratch.row.resize(term.basis.count(), 0.0);
-            term.basis.fill(&at, &mut scratch.row);
-            scratch.touched.clear();
-            scratch.touched.extend((0..scratch.row.len()).filter(|&j| scratch.row[j] != 0.0));
-            for (part, coefficients) in parts {
-                let touched = scratch.touched.iter();
-                scratch.parts[*part] +=
-                    touched.map(|&j| scratch.row[j] * coefficients[j]).sum::<f64>();
-            }
-            if !variances.is_empty() {
-                let touched = scratch.touched.iter();
-                own += touched.map(|&j| scratch.row[j].powi(2) * variances[j]).sum::<f64>();
-            }
+        for Spread { term: (term, learnt), parts: mine, own: variances } in &self.shapes {
+            term.basis.visit(&where_held(&term.basis, *learnt, place), |j, g| {
+                mine.iter().for_each(|(part, coefficients)| parts[*part] += g * coefficients[j]);
+                own += variances.get(j).map_or(0.0, |variance| g * g * variance);
+            });
         }
-        own + scratch.parts.iter().map(|p| p * p).sum::<f64>()
+        own + parts.iter().map(|p| p * p).sum::<f64>()
     }
-}
-
-#[derive(Default)]
-pub(super) struct Scratch {
-    row: Vec<f64>,
-    touched: Vec<usize>,
-    parts: Vec<f64>,
 }
 
 /// The place itself, or that with the last disparity at which the shape was learnt.

@@ -60,7 +60,7 @@ impl Fitted<'_> {
 
     /// Of the shape at a place, with these coefficients.
     pub fn value(&self, coefficients: &[f64], place: PixelContext) -> f64 {
-        self.shape.value(coefficients, &place, &mut Vec::new())
+        self.shape.value(coefficients, &place)
     }
 
     fn delta(&self, of: &dyn Fn(&[f64]) -> f64) -> f64 {

@@ -87,17 +87,16 @@ mod tests {
     /// Of the square of a change of log variance from .8 to 4 m, what the best of `shapes` leaves.
     fn left(shapes: &[Basis], change: impl Fn(f64) -> f64) -> f64 {
         let depths = || (0..=64).map(|n| 0.8 + 0.05 * f64::from(n));
-        let mut row = Vec::new();
-        let mut of = |shape: &Basis| {
+        let of = |shape: &Basis| {
             let (mut fitted, mut square, mut own) = (0.0, 0.0, 0.0);
             for z in depths() {
                 let at = PixelContext { z, ..PixelContext::default() };
-                let (x, y) = (shape.value(&[1.0], &at, &mut row), change(z));
+                let (x, y) = (shape.value(&[1.0], &at), change(z));
                 (fitted, square, own) = (fitted + x * y, square + y * y, own + x * x);
             }
             1.0 - fitted * fitted / (own * square)
         };
-        shapes.iter().map(&mut of).fold(1.0, f64::min)
+        shapes.iter().map(of).fold(1.0, f64::min)
     }
 
     /// Noise of other formulas than ours, small and large, keeps the name; noise that grows and falls

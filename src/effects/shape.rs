@@ -112,7 +112,6 @@ fn values(terms: &[&Term], exposure: &Exposure) -> Vec<f32> {
     }
     let scene = Scene::of(exposure, terms.iter().fold(Needs::default(), |n, t| n.and(t.needs())));
     sums.par_chunks_mut(seen.width).enumerate().for_each(|(row, line)| {
-        let mut scratch = Vec::new();
         for (u, sum) in line.iter_mut().enumerate() {
             let i = row * seen.width + u;
             if seen.depth[i].is_nan() {
@@ -120,8 +119,7 @@ fn values(terms: &[&Term], exposure: &Exposure) -> Vec<f32> {
             }
             let place = scene.place(i);
             let applies = |t: &&&Term| scene.knows(t, i);
-            *sum = terms.iter().filter(applies).map(|t| t.value(&place, &mut scratch)).sum::<f64>()
-                as f32;
+            *sum = terms.iter().filter(applies).map(|t| t.value(&place)).sum::<f64>() as f32;
         }
     });
     sums

@@ -119,13 +119,12 @@ fn relief_m(flat: &Flat, shape: &Basis, coefficients: &[f64]) -> f64 {
     const NODES: usize = 9;
     let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
     let (at_right, at_down) = (middle(flat.right), middle(flat.down));
-    let mut row = Vec::new();
     let mut places: Vec<[f64; 3]> = Vec::new();
     for right in even(flat.right, NODES) {
         for down in even(flat.down, NODES) {
             // So far from the sensor that a lift is told in metres.
             let place = PixelContext { right, down, disparity: 1.0, rho: 1.0, ..Default::default() };
-            let height = shape.value(coefficients, &place, &mut row);
+            let height = shape.value(coefficients, &place);
             places.push([right - at_right, down - at_down, height]);
         }
     }

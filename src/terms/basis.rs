@@ -4,7 +4,7 @@ use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::place::PixelContext;
 use super::series::{
-    bilinear, cubic, interpolated, lens, node, on_ring, powers, waves, without_line,
+    bilinear, cubic, hat_without_line, interpolated, lens, node, on_ring, powers, waves,
 };
 
 /// A term with everything but its linear coefficients settled. Terms of the bias are in px of
@@ -120,88 +120,89 @@ impl Basis {
         series
     }
 
-    /// The columns at a place; `out` has [`Basis::count`] entries.
-    pub fn fill(&self, p: &PixelContext, out: &mut [f64]) {
+    /// Tells the columns that may not be zero at a place, number and value.
+    pub fn visit(&self, p: &PixelContext, mut see: impl FnMut(usize, f64)) {
         match *self {
-            Basis::Level => out[0] = 1.0,
-            Basis::Powers { over, level, times, .. } => {
-                powers(times.value(p), over.value(p), level, out);
+            Basis::Level => see(0, 1.0),
+            Basis::Powers { over, orders, level, times } => {
+                powers([times.value(p), over.value(p)], orders, level, see);
             }
-            Basis::Polynomial { over: [a, b], times, .. } => {
+            Basis::Polynomial { over: [a, b], degree, times } => {
                 let (scale, a, b) = (times.value(p), to_fourth(a.value(p)), to_fourth(b.value(p)));
-                for (g, (i, j)) in out.iter_mut().zip(BENT) {
-                    *g = scale * a[i] * b[j];
-                }
+                let powers = BENT.iter().filter(|(i, j)| i + j <= degree).enumerate();
+                powers.for_each(|(k, (i, j))| see(k, scale * a[*i] * b[*j]));
             }
-            Basis::Waves { over, period, times, .. } => waves(over, period, times.value(p), p, out),
-            Basis::Lens { fx, fy, reference_px, .. } => lens([fx, fy], reference_px, p, out),
-            Basis::Decay { over, width } => out[0] = (-over.value(p) / width).exp(),
-            Basis::Log1p { over } => out[0] = over.value(p).ln_1p(),
+            Basis::Waves { over, period, harmonics, times } => {
+                waves((over, period, harmonics), times.value(p), p, see);
+            }
+            Basis::Lens { fx, fy, reference_px, orders } => {
+                lens([fx, fy], reference_px, orders, p, see);
+            }
+            Basis::Decay { over, width } => see(0, (-over.value(p) / width).exp()),
+            Basis::Log1p { over } => see(0, over.value(p).ln_1p()),
             Basis::Table { z_m, theta_rad, ref columns } => {
                 let at_z = node(p.z, z_m[0], z_m[1], TABLE);
                 let at_theta = node(p.theta, theta_rad[0], theta_rad[1], TABLE);
-                for (g, column) in out.iter_mut().zip(columns) {
-                    *g = interpolated(column, TABLE, at_z, at_theta);
+                for (k, column) in columns.iter().enumerate() {
+                    see(k, interpolated(column, TABLE, at_z, at_theta));
                 }
             }
-            Basis::Curve { over, low, high, times, .. } => {
-                out.fill(0.0);
-                let (k, t) = node(over.value(p), low, high, out.len());
+            Basis::Curve { over, low, high, nodes, times } => {
+                let (k, t) = node(over.value(p), low, high, nodes);
                 let scale = times.value(p);
-                out[k] = scale * (1.0 - t);
-                out[k + 1] = scale * t;
                 if self.is_lift_of_target() {
-                    without_line(out);
+                    // Of its columns none is nothing: the straight part is taken out.
+                    let weight = |j| hat_without_line(j, k as f64 + t, nodes);
+                    (0..nodes).for_each(|j| see(j, scale * weight(j)));
+                } else {
+                    see(k, scale * (1.0 - t));
+                    see(k + 1, scale * t);
                 }
             }
             Basis::Ring { over, period, nodes, times } => {
-                out.fill(0.0);
                 let ([k, next], t) = on_ring(over.value(p), period, nodes);
                 let scale = times.value(p);
-                out[k] += scale * (1.0 - t);
-                out[next] += scale * t;
+                see(k, scale * (1.0 - t));
+                see(next, scale * t);
             }
             Basis::Map { width, height, across, down, times } => {
-                let (i, s) = node(p.u, 0.0, width - 1.0, across);
-                let (j, t) = node(p.v, 0.0, height - 1.0, down);
-                bilinear((i, s), (j, t), across, times.value(p), out);
+                let at = [node(p.u, 0.0, width - 1.0, across), node(p.v, 0.0, height - 1.0, down)];
+                bilinear(at, across, times.value(p), see);
             }
-            Basis::Spline { across, .. } => {
-                out.fill(0.0);
-                if let Some((first, values)) = self.spline_at(p) {
-                    for (row, values) in values.chunks_exact(4).enumerate() {
-                        out[first + row * across..][..4].copy_from_slice(values);
-                    }
+            Basis::Spline { width, height, across, down, times } => {
+                let (i, of_columns) = cubic(p.u, width - 1.0, across);
+                let (j, of_rows) = cubic(p.v, height - 1.0, down);
+                let scale = times.value(p);
+                for (row, y) in of_rows.iter().enumerate() {
+                    let first = (j + row) * across + i;
+                    of_columns.iter().enumerate().for_each(|(k, x)| see(first + k, scale * x * y));
                 }
             }
             Basis::Affine { times } => {
                 let far = times.value(p);
-                out.copy_from_slice(&[far, far * p.x, far * p.y]);
+                [far, far * p.x, far * p.y].into_iter().enumerate().for_each(|(k, g)| see(k, g));
             }
             Basis::Pair { over, low, high, nodes } => {
-                let (i, s) = node(over[0].value(p), low[0], high[0], nodes[0]);
-                let (j, t) = node(over[1].value(p), low[1], high[1], nodes[1]);
-                bilinear((i, s), (j, t), nodes[0], 1.0, out);
+                let at = [0, 1].map(|k| node(over[k].value(p), low[k], high[k], nodes[k]));
+                bilinear(at, nodes[0], 1.0, see);
             }
         }
     }
 
-    /// Of a map of splines: the first of the 4 x 4 columns that are not zero at a place, and their
-    /// values, row by row.
-    pub fn spline_at(&self, p: &PixelContext) -> Option<(usize, [f64; 16])> {
-        let Basis::Spline { width, height, across, down, times } = *self else { return None };
-        let scale = times.value(p);
-        let (i, of_columns) = cubic(p.u, width - 1.0, across);
-        let (j, of_rows) = cubic(p.v, height - 1.0, down);
-        let value = |k: usize| scale * of_columns[k % 4] * of_rows[k / 4];
-        Some((j * across + i, std::array::from_fn(value)))
+    /// The columns at a place; `out` has [`Basis::count`] entries.
+    pub fn fill(&self, p: &PixelContext, out: &mut [f64]) {
+        out.fill(0.0);
+        self.visit(p, |k, g| out[k] += g);
     }
 
     /// Value of the term at a place.
-    pub fn value(&self, coefficients: &[f64], p: &PixelContext, row: &mut Vec<f64>) -> f64 {
-        row.clear();
-        row.resize(self.count(), 0.0);
-        self.fill(p, row);
-        row.iter().zip(coefficients).map(|(g, b)| g * b).sum()
+    pub fn value(&self, coefficients: &[f64], p: &PixelContext) -> f64 {
+        let mut sum = 0.0;
+        self.visit(p, |k, g| sum += g * coefficients[k]);
+        sum
     }
 }
+
+#[cfg(test)]
+#[path = "basis_tests.rs"]
+mod tests;

@@ -12,7 +12,6 @@ mod pixels;
 mod place;
 mod properties;
 mod series;
-mod value;
 mod written;
 
 pub use basis::{Basis, TABLE};
@@ -89,6 +88,16 @@ impl Term {
     pub fn times(&self, factor: f64) -> Self {
         let coefficients = self.coefficients.iter().map(|c| factor * c).collect();
         Term { coefficients, ..self.clone() }
+    }
+
+    /// At a place, px or nepers of variance.
+    pub fn value(&self, p: &PixelContext) -> f64 {
+        self.basis.value(&self.coefficients, p)
+    }
+
+    /// Of all these terms together.
+    pub fn sum(terms: &[Term], p: &PixelContext) -> f64 {
+        terms.iter().map(|t| t.value(p)).sum()
     }
 
     /// Of the logarithm of its variance.

@@ -7,44 +7,59 @@ use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::place::PixelContext;
 
-/// `base` times `scale`, its square, and so on; `scale` itself after the first where there is a
-/// level.
-pub(super) fn powers(scale: f64, base: f64, level: bool, out: &mut [f64]) {
+/// `base` times `scale`, its square, and so on, `orders` of them; `scale` itself after the first where there
+/// is a level.
+pub(super) fn powers(
+    [scale, base]: [f64; 2],
+    orders: usize,
+    level: bool,
+    mut see: impl FnMut(usize, f64),
+) {
     let mut term = scale;
-    for (k, g) in out.iter_mut().enumerate() {
-        if level && k == 1 {
-            *g = scale;
-            continue;
-        }
+    for k in 0..orders {
         term *= base;
-        *g = term;
+        see(k + usize::from(level && k > 0), term);
+    }
+    if level {
+        see(1, scale);
     }
 }
 
 /// A spot at (x, y) is seen at (x, y) (1 + k r^2n). Its pixel then shows the disparity of another ray, and its
 /// shift against the reference is larger in the ratio in which x (1 + k r^2n) grows with x.
-pub(super) fn lens([fx, fy]: [f64; 2], reference_px: f64, p: &PixelContext, out: &mut [f64]) {
+pub(super) fn lens(
+    [fx, fy]: [f64; 2],
+    reference_px: f64,
+    orders: usize,
+    p: &PixelContext,
+    mut see: impl FnMut(usize, f64),
+) {
     let square = p.x * p.x + p.y * p.y;
     let elsewhere = Modulation::RadialSlope { fx, fy }.value(p);
     let shift = p.disparity - reference_px;
     let mut power = 1.0;
-    for (n, g) in out.iter_mut().enumerate() {
+    for n in 0..orders {
         let stretch = square + 2.0 * (n + 1) as f64 * p.x * p.x;
-        *g = power * (square * elsewhere + stretch * shift);
+        see(n, power * (square * elsewhere + stretch * shift));
         power *= square;
     }
 }
 
-/// Sine and cosine of a phase and of its multiples. A patch sees the mean over what it spans of the
-/// coordinate.
-pub(super) fn waves(over: Coordinate, period: f64, scale: f64, p: &PixelContext, out: &mut [f64]) {
+/// Sine and cosine of a coordinate's phase and of its multiples. A patch sees the mean over what it spans of
+/// the coordinate.
+pub(super) fn waves(
+    (over, period, harmonics): (Coordinate, f64, usize),
+    scale: f64,
+    p: &PixelContext,
+    mut see: impl FnMut(usize, f64),
+) {
     let first = Turn::by(over.value(p) / period);
     let mut turn = first;
     let mut seen = seen(over, period, p);
-    for pair in out.chunks_exact_mut(2) {
+    for k in 0..harmonics {
         let size = scale * seen();
-        pair[0] = size * turn.sine;
-        pair[1] = size * turn.cosine;
+        see(2 * k, size * turn.sine);
+        see(2 * k + 1, size * turn.cosine);
         turn = turn.and(first);
     }
 }
@@ -106,20 +121,14 @@ fn sincs(cycles: f64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Take out of the nodes' weights what a straight line over the nodes is: a surface that is moved
-/// or tilted as a whole is a plane again, and no fit to planes can tell how far.
-pub(super) fn without_line(weights: &mut [f64]) {
-    let n = weights.len() as f64;
+/// Weight of node `k` at a `place` between the nodes, without what a straight line over the nodes is: a surface
+/// that is moved or tilted as a whole is a plane again, and no fit to planes can tell how far.
+pub(super) fn hat_without_line(k: usize, place: f64, nodes: usize) -> f64 {
+    let (k, n) = (k as f64, nodes as f64);
     let middle = 0.5 * (n - 1.0);
     let squares = n * (n * n - 1.0) / 12.0;
-    let (mut sum, mut moment) = (0.0, 0.0);
-    for (k, w) in weights.iter().enumerate() {
-        sum += w;
-        moment += w * (k as f64 - middle);
-    }
-    for (k, w) in weights.iter_mut().enumerate() {
-        *w -= sum / n + moment / squares * (k as f64 - middle);
-    }
+    let hat = (1.0 - (place - k).abs()).max(0.0);
+    hat - 1.0 / n - (place - middle) / squares * (k - middle)
 }
 
 /// Number of the node below a value, and the way to the next.
@@ -130,22 +139,20 @@ pub(super) fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64
     (k, place - k as f64)
 }
 
+/// The four nodes about a place between those of a map.
 pub(super) fn bilinear(
-    (i, s): (usize, f64),
-    (j, t): (usize, f64),
+    [(i, s), (j, t)]: [(usize, f64); 2],
     across: usize,
     scale: f64,
-    out: &mut [f64],
+    mut see: impl FnMut(usize, f64),
 ) {
-    out.fill(0.0);
-    for (dj, wv) in [(0, 1.0 - t), (1, t)] {
-        for (di, wu) in [(0, 1.0 - s), (1, s)] {
-            out[(j + dj) * across + i + di] = scale * wu * wv;
-        }
+    for (j, y) in [(j, 1.0 - t), (j + 1, t)] {
+        see(j * across + i, scale * (1.0 - s) * y);
+        see(j * across + i + 1, scale * s * y);
     }
 }
 
-/// The value there of a bilinear map with these values at its nodes.
+/// The value between the nodes of a bilinear map with these values at them.
 pub(super) fn interpolated(
     nodes: &[f64],
     across: usize,
@@ -200,7 +207,7 @@ mod tests {
                 ..Default::default()
             };
             let mut seen = [0.0; 6];
-            waves(over, period, 1.0, &place, &mut seen);
+            waves((over, period, 3), 1.0, &place, |k, g| seen[k] = g);
             let mut means = [0.0; 6];
             let along = |k: usize| ((k as f64 + 0.5) / STEPS as f64 - 0.5) * side;
             for (k, l) in (0..STEPS).flat_map(|k| (0..STEPS / 40).map(move |l| (k, 40 * l + 20))) {
@@ -214,7 +221,7 @@ mod tests {
                     ..place
                 };
                 let mut row = [0.0; 6];
-                waves(over, period, 1.0, &point, &mut row);
+                waves((over, period, 3), 1.0, &point, |k, g| row[k] = g);
                 let share = 1.0 / (STEPS * (STEPS / 40)) as f64;
                 means.iter_mut().zip(row).for_each(|(m, r)| *m += share * r);
             }
@@ -251,7 +258,7 @@ mod tests {
                     ..PixelContext::default()
                 };
                 let mut row = [0.0; 2];
-                lens([f, f], at_reference, &place, &mut row);
+                lens([f, f], at_reference, 2, &place, |k, g| row[k] = g);
                 let said = k * row[n as usize - 1];
                 // Taylor's remainder, of the second order in the shift and in k.
                 let order = f64::from(n);

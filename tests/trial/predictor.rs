@@ -86,8 +86,7 @@ impl Predictor for ModelPredictor {
         let known = |t: &&Term| conditions.temperature_c.is_some() || !t.needs().temperature;
         let terms: Vec<&Term> = self.variance.iter().filter(known).collect();
         let theta = plane.theta();
-        let mut row = Vec::new();
-        let mut of = |i: usize| {
+        let of = |i: usize| {
             let mut place = pixels.place(i);
             place.side = 1.0;
             place.edge = f64::from(edge[i]);
@@ -99,7 +98,7 @@ impl Predictor for ModelPredictor {
             place.ambient = conditions.ambient_lux.unwrap_or(0.0);
             let sigma = self.sigma.axial_sigma(place.z, theta);
             place.variance = (sigma * scale_px_m / (place.z * place.z)).powi(2);
-            let log: f64 = terms.iter().map(|t| t.value(&place, &mut row)).sum();
+            let log: f64 = terms.iter().map(|t| t.value(&place)).sum();
             let log = if log.is_finite() { log } else { 0.0 };
             (sigma * (0.5 * log.clamp(-MAX_LOG_VARIANCE, MAX_LOG_VARIANCE)).exp()) as f32
         };

@@ -36,8 +36,7 @@ pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
 }
 
 fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
-    let mut row = Vec::new();
-    view.places.iter().map(|place| Term::sum(terms, place, &mut row)).collect()
+    view.places.iter().map(|place| Term::sum(terms, place)).collect()
 }
 
 /// The terms' values at the patches, with the plane fitted anew.

@@ -155,12 +155,12 @@ impl Still {
         let camera = &bench.sensor.camera;
         let pixels = Pixels::new(camera, &bench.rays, 1.0);
         let still = |(power, terms): (f64, Vec<Term>)| {
-            let value = |row: &mut Vec<f64>, i: usize| {
+            let value = |i: usize| {
                 let (side, disparity) = (1.0, DISPARITY_UNIT_PX);
-                Term::sum(&terms, &PixelContext { side, disparity, ..pixels.place(i) }, row)
+                Term::sum(&terms, &PixelContext { side, disparity, ..pixels.place(i) })
             };
             let all = (0..camera.width * camera.height).into_par_iter();
-            Still { power, values: all.map_init(Vec::new, value).collect() }
+            Still { power, values: all.map(value).collect() }
         };
         (by_power.into_iter().map(still).collect(), others)
     }
@@ -188,7 +188,6 @@ pub(in crate::diagnose) fn pixel_terms(
         .map(|f| {
             let of_view = || Places::of(f, &bench.sensor.camera, &bench.rays, start);
             let places = (!others.is_empty()).then(of_view);
-            let mut row = Vec::new();
             (0..f.pixels.len())
                 .map(|k| {
                     let disparity = f.disparity(k, &bench.rays);
@@ -197,7 +196,7 @@ pub(in crate::diagnose) fn pixel_terms(
                     if let Some(places) = &places {
                         let mut place = places.pixel(k);
                         place.light = survey.light.of(f, k, &place);
-                        sum += Term::sum(&others, &place, &mut row);
+                        sum += Term::sum(&others, &place);
                     }
                     sum as f32
                 })
@@ -247,7 +246,7 @@ mod tests {
         field.edge = vec![9.0; field.pixels.len()];
         let places = Places::of(&field, camera, &bench.rays, 0.0);
         for k in 0..field.pixels.len() {
-            let truth = Term::sum(&terms[..STILL], &places.pixel(k), &mut Vec::new());
+            let truth = Term::sum(&terms[..STILL], &places.pixel(k));
             let disparity = field.disparity(k, &bench.rays);
             let at = |s: &Still| s.at(field.pixels[k], disparity);
             let sum: f64 = still.iter().map(at).sum();

@@ -20,8 +20,7 @@ pub struct Scene<'a> {
 impl Scene<'_> {
     /// A term's values, what the views' planes take taken out.
     pub fn values(&self, term: &Term) -> Vec<Vec<f64>> {
-        let mut row = Vec::new();
-        self.levelled(|view| view.places.iter().map(|p| term.value(p, &mut row)).collect())
+        self.levelled(|view| view.places.iter().map(|p| term.value(p)).collect())
     }
 
     pub fn responses(&self) -> Vec<Vec<f64>> {

@@ -70,9 +70,9 @@ pub fn families<'a>(terms: impl Iterator<Item = &'a Term>, camera: &Camera) -> V
 }
 
 fn mean_square(term: &Term, pixels: &Pixels<'_>) -> f64 {
-    let (mut sum, mut count, mut row) = (0.0, 0.0, Vec::new());
+    let (mut sum, mut count) = (0.0, 0.0);
     for place in pixels.sampled() {
-        sum += term.value(&place, &mut row).powi(2);
+        sum += term.value(&place).powi(2);
         count += 1.0;
     }
     sum / f64::max(count, 1.0)

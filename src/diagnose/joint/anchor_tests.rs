@@ -108,14 +108,14 @@ fn a_lens_without_references_moves_no_plane() {
         let tilted = 34.0 + 40.0 * place.x - 20.0 * place.y;
         for disparity in [tilted, 60.0] {
             let at = PixelContext { disparity, slope: [0.0; 2], ..place };
-            let [px, lens] = [&shape[..], &shape[..1]].map(|s| Term::sum(s, &at, &mut Vec::new()));
+            let [px, lens] = [&shape[..], &shape[..1]].map(|s| Term::sum(s, &at));
             // Whatever the plane, it is a multiple of its own disparity and a constant.
             let taken = (disparity - 26.0) * -coefficients[2];
             assert!((lens - px - taken).abs() < 1e-12, "{k}: {lens} {px} {taken}");
         }
         let at = PixelContext { disparity: 60.0, slope: [0.0; 2], ..place };
-        told += Term::sum(shape, &at, &mut Vec::new());
-        alone += Term::sum(&shape[..1], &at, &mut Vec::new());
+        told += Term::sum(shape, &at);
+        alone += Term::sum(&shape[..1], &at);
     }
     assert!(told.abs() < 0.01 * alone.abs(), "{told} of {alone}");
 }

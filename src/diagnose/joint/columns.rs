@@ -100,8 +100,11 @@ impl Columns {
     /// them are zero.
     fn add(&self, view: &ViewData, sum: &mut Evidence) {
         let Some(rows) = view.rows(&view.response) else { return };
-        let first =
-            |i: usize| self.maps[0].spline_at(&view.places[i]).map_or(0, |(first, _)| first);
+        let first = |i: usize| {
+            let mut first = usize::MAX;
+            self.maps[0].visit(&view.places[i], |node, _| first = first.min(node));
+            first
+        };
         let touched = |first| self.touched(first).collect();
         let fill = |i: usize, row: &mut [f64]| {
             self.fill_touched(&view.places[i], row);
@@ -171,10 +174,12 @@ impl Columns {
         self.fill_terms(place, terms);
         let mut begins = 0;
         for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(SPLINES)) {
-            if let Some((first, values)) = map.spline_at(place) {
-                nodes.copy_from_slice(&values);
-                begins = first;
-            }
+            let mut k = 0;
+            map.visit(place, |node, value| {
+                begins = if k == 0 { node } else { begins };
+                nodes[k] = value;
+                k += 1;
+            });
         }
         for (&times, affine) in self.absorbed_times.iter().zip(affine.chunks_exact_mut(3)) {
             Basis::Affine { times }.fill(place, affine);

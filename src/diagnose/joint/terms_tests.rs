@@ -43,7 +43,7 @@ fn a_nameless_curve_does_not_share_what_a_name_says() {
     let families: Vec<_> = outcome.chosen.iter().map(|c| c.candidate.family).collect();
     assert!(families.iter().all(|f| *f == Some("column-banding")), "{families:?}");
     let terms = terms_of(&outcome, Statistic::Bias);
-    let at = |u| Term::sum(&terms, &PixelContext { u, ..data[0].places[0] }, &mut Vec::new());
+    let at = |u| Term::sum(&terms, &PixelContext { u, ..data[0].places[0] });
     let height = 0.5 * (at(65.0) - at(75.0));
     assert!((height - 0.1).abs() < 0.01, "{height}");
 }

@@ -80,7 +80,7 @@ pub(super) fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
 /// say, px.
 pub(super) fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
     let (mut squares, mut n) = ([0.0; 2], 0.0);
-    let (terms, mut row) = (terms_of(outcome, Statistic::Bias), Vec::new());
+    let terms = terms_of(outcome, Statistic::Bias);
     for view in data {
         let x = DMatrix::from_row_slice(view.places.len(), 3, &view.nuisance);
         let solver = x.clone().svd(true, true);
@@ -88,7 +88,7 @@ pub(super) fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
         for square in &mut squares {
             *square += (&y - &x * solver.solve(&y, 1e-12).unwrap()).norm_squared();
             for term in terms.iter().filter(|t| t.is_sensor_bias()) {
-                let values = view.places.iter().map(|p| term.value(p, &mut row));
+                let values = view.places.iter().map(|p| term.value(p));
                 y -= DVector::from_iterator(view.places.len(), values);
             }
         }
@@ -118,9 +118,8 @@ fn what_planes_absorb_comes_out_as_nothing() {
     let rng = &mut Seed(5).stream("joint/affine");
     let data = session([0.8, 3.0], rng, |p| 0.7 - 0.4 * p.x + 0.3 * p.y);
     let outcome = fitted(&data, vec![bowl(), map()]);
-    let (terms, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
-    let sizes =
-        data.iter().flat_map(|v| v.places.iter()).map(|p| Term::sum(&terms, p, &mut row).abs());
+    let terms = terms_of(&outcome, Statistic::Bias);
+    let sizes = data.iter().flat_map(|v| v.places.iter()).map(|p| Term::sum(&terms, p).abs());
     let most = sizes.fold(0.0, f64::max);
     assert!(most < 0.05, "{most}");
 }
@@ -135,14 +134,14 @@ fn a_slope_of_the_disparity_squared_is_left_out_and_bends_no_map() {
     let rng = &mut Seed(7).stream("joint/slope");
     let data = session([0.8, 3.0], rng, |p| wide(p) * far(p) + slope(p));
     let outcome = fitted(&data, vec![bowl(), map()]);
-    let (terms, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
+    let terms = terms_of(&outcome, Statistic::Bias);
     // A frontal plane at 0.9 m.
     let disparity = SCALE_PX_M / 0.9;
     let places: Vec<PixelContext> =
         data[0].places.iter().map(|p| PixelContext { disparity, z: 0.9, rho: 0.9, ..*p }).collect();
     let x = DMatrix::from_fn(places.len(), 3, |i, k| [1.0, places[i].x, places[i].y][k]);
     let solver = x.clone().svd(true, true);
-    let told = places.iter().map(|p| Term::sum(&terms, p, &mut row));
+    let told = places.iter().map(|p| Term::sum(&terms, p));
     let told = DVector::from_iterator(places.len(), told);
     let affine = solver.solve(&told, 1e-12).unwrap();
     assert!(affine.amax() < 0.02, "{affine}");
@@ -176,20 +175,16 @@ fn the_stated_error_is_the_true_one() {
     let wide = |p: &PixelContext| 0.15 * (p.u / 70.0).sin() * (p.v / 60.0).cos();
     let bias = |p: &PixelContext| 0.3 * p.radius.powi(2) + wide(p);
     let (mut squares, mut inside, mut n) = (0.0, 0.0, 0.0);
-    let mut row = Vec::new();
     for seed in 0..6 {
         let rng = &mut Seed(seed).stream("joint/error");
         let data = session([0.8, 3.0], rng, bias);
         let outcome = fitted(&data, vec![bowl(), map()]);
-        let mut sum = |numbers: &dyn Fn(usize) -> f64, p: &PixelContext, power: i32| -> f64 {
+        let sum = |numbers: &dyn Fn(usize) -> f64, p: &PixelContext, power: i32| -> f64 {
             let mut total = 0.0;
             for (k, c) in outcome.chosen.iter().enumerate() {
-                let basis = &c.candidate.basis;
-                row.clear();
-                row.resize(basis.count(), 0.0);
-                basis.fill(p, &mut row);
-                let span = outcome.span(k);
-                total += row.iter().zip(span).map(|(g, j)| g.powi(power) * numbers(j)).sum::<f64>();
+                let first = outcome.span(k).start;
+                let add = |j: usize, g: f64| total += g.powi(power) * numbers(first + j);
+                c.candidate.basis.visit(p, add);
             }
             total
         };
@@ -278,8 +273,8 @@ fn a_curve_beside_bands_is_their_rest() {
     let named = Chosen { gain: 1500.0, ..term(Some("column-banding"), waves) };
     let outcome = fitted(&data, vec![named, Chosen { gain: 100.0, ..term(None, curve) }]);
     assert_eq!(outcome.chosen[0].candidate.family, Some("column-banding"));
-    let (told, mut row) = (terms_of(&outcome, Statistic::Bias), Vec::new());
-    let mut at = |u: f64| told[0].value(&PixelContext { u, ..Default::default() }, &mut row);
+    let told = terms_of(&outcome, Statistic::Bias);
+    let at = |u: f64| told[0].value(&PixelContext { u, ..Default::default() });
     let height = (0..160).map(|u| at(f64::from(u)).abs()).fold(0.0, f64::max);
     assert!((0.03..0.05).contains(&height), "{height}");
 }

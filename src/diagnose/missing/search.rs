@@ -122,15 +122,14 @@ impl<'a> Losses<'a> {
     /// Log odds that a shape adds.
     pub fn explained(&self, judged: &Judged) -> Vec<Vec<f64>> {
         let size = &judged.coefficients;
-        let mut row = Vec::new();
         let views = self.views.iter();
         match &judged.shape {
             Shape::Step(step) => views
                 .map(|v| step.column(v, self.base).iter().map(|h| size[0] * h).collect())
                 .collect(),
-            Shape::Curve(basis) => views
-                .map(|v| v.iter().map(|c| basis.value(size, c.place, &mut row)).collect())
-                .collect(),
+            Shape::Curve(basis) => {
+                views.map(|v| v.iter().map(|c| basis.value(size, c.place)).collect()).collect()
+            }
         }
     }
 

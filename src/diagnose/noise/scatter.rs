@@ -181,9 +181,7 @@ impl Case<'_> {
     /// on a cause that was taken for noise: against it everything has tails.
     fn holds_tails(&self, term: &Term) -> bool {
         const MUCH: f64 = -1.4;
-        let mut row = Vec::new();
         let mut places = self.survey.views.iter().flat_map(|v| v.places.iter());
-        !matches!(term.basis, Basis::Table { .. })
-            || places.all(|place| term.value(place, &mut row) > MUCH)
+        !matches!(term.basis, Basis::Table { .. }) || places.all(|place| term.value(place) > MUCH)
     }
 }

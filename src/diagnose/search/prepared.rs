@@ -63,10 +63,9 @@ pub struct Prepared<'a> {
 /// A view's response, terms with these coefficients taken out.
 pub fn without(view: &ViewData, settled: &[(&Basis, Vec<f64>)]) -> Vec<f64> {
     let mut response = view.response.clone();
-    let mut scratch = Vec::new();
     for (basis, beta) in settled {
         for (y, place) in response.iter_mut().zip(view.places.iter()) {
-            *y -= basis.value(beta, place, &mut scratch);
+            *y -= basis.value(beta, place);
         }
     }
     response

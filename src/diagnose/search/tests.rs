@@ -258,7 +258,7 @@ fn a_lift_that_planes_take_up_is_none() {
         let coefficients = outcome.chosen.first().map_or(vec![0.0; 3], |_| outcome.coefficients(0));
         let at = |right| {
             let place = PixelContext { right, disparity: 1.0, rho: 1.0, ..PixelContext::default() };
-            lift.value(&coefficients, &place, &mut Vec::new()).abs()
+            lift.value(&coefficients, &place).abs()
         };
         [-1.0, 0.0, 1.0].map(at).into_iter().fold(0.0, f64::max)
     };

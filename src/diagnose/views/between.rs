@@ -31,11 +31,9 @@ pub fn between(views: &[ViewData], terms: &[Term]) -> Vec<f64> {
 
 /// What a view says of the terms' sizes beyond their common one.
 fn of_view(view: &ViewData, terms: &[Term]) -> Option<Evidence> {
-    let mut row = Vec::new();
-    let mut sizes = |place: &PixelContext| -> Vec<f64> {
-        terms.iter().map(|t| t.value(place, &mut row)).collect()
-    };
-    let columns: Vec<Vec<f64>> = view.places.iter().map(&mut sizes).collect();
+    let sizes =
+        |place: &PixelContext| -> Vec<f64> { terms.iter().map(|t| t.value(place)).collect() };
+    let columns: Vec<Vec<f64>> = view.places.iter().map(sizes).collect();
     let rest = view.response.iter().zip(&columns).map(|(y, g)| y - g.iter().sum::<f64>());
     let rest: Vec<f64> = rest.collect();
     let rows = view.rows(&rest)?;

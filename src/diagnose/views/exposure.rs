@@ -79,11 +79,10 @@ impl Field {
         }
         let mut sigma = self.sigma.clone();
         let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
-        let mut row = Vec::new();
         for k in 0..n {
             let place = places.pixel(k);
-            expected[k] += Term::sum(&known.bias, &place, &mut row) as f32;
-            sigma[k] *= (0.5 * Term::sum(&known.variance, &place, &mut row)).exp() as f32;
+            expected[k] += Term::sum(&known.bias, &place) as f32;
+            sigma[k] *= (0.5 * Term::sum(&known.variance, &place)).exp() as f32;
         }
         self.sigma = sigma;
         expected
@@ -92,8 +91,7 @@ impl Field {
     /// What was taken out of each pixel while reading, px: whole columns' steps, and these terms.
     pub fn taken_out(&self, terms: &[Term], bench: &Workbench<'_>) -> Vec<f32> {
         let places = Places::of(self, &bench.sensor.camera, &bench.rays, self.time_s);
-        let mut row = Vec::new();
-        let mut of_terms = |k| Term::sum(terms, &places.pixel(k), &mut row) as f32;
+        let of_terms = |k| Term::sum(terms, &places.pixel(k)) as f32;
         let of_pixel = |(k, &i): (usize, &u32)| self.column_error(i) + of_terms(k);
         self.pixels.iter().enumerate().map(of_pixel).collect()
     }

@@ -38,9 +38,9 @@ impl Errors {
         self.parts.len() + self.own.iter().map(|t| t.coefficients.len()).sum::<usize>()
     }
 
-    fn fill(&self, place: &PixelContext, columns: &mut [f64], row: &mut Vec<f64>) {
+    fn fill(&self, place: &PixelContext, columns: &mut [f64]) {
         let (together, mut rest) = columns.split_at_mut(self.parts.len());
-        together.iter_mut().zip(&self.parts).for_each(|(g, part)| *g = Term::sum(part, place, row));
+        together.iter_mut().zip(&self.parts).for_each(|(g, part)| *g = Term::sum(part, place));
         for term in &self.own {
             let (mine, others) = rest.split_at_mut(term.coefficients.len());
             term.basis.fill(place, mine);
@@ -56,8 +56,7 @@ impl Errors {
         let n = self.count();
         let of = |view: &ViewData| -> Option<Evidence> {
             let rows = view.rows(&view.response)?;
-            let mut row = Vec::new();
-            Some(rows.reduce(n, |i, g| self.fill(&view.places[i], g, &mut row)))
+            Some(rows.reduce(n, |i, g| self.fill(&view.places[i], g)))
         };
         if n == 0 {
             return Vec::new();
@@ -144,9 +143,8 @@ impl Survey {
             return;
         }
         self.views.par_iter_mut().for_each(|view| {
-            let mut row = Vec::new();
             for (place, t) in view.tiles_mut() {
-                let off = Term::sum(&off, place, &mut row);
+                let off = Term::sum(&off, place);
                 t.square += off * (off - 2.0 * t.mean);
                 t.mean -= off;
             }
@@ -162,9 +160,8 @@ impl Survey {
             return;
         }
         self.views.par_iter_mut().for_each(|view| {
-            let mut row = Vec::new();
             for (place, t) in view.patches_mut() {
-                let factor = Term::sum(&off, place, &mut row).exp();
+                let factor = Term::sum(&off, place).exp();
                 t.noise_variance *= factor;
                 place.variance *= factor;
             }

@@ -46,9 +46,8 @@ impl ViewData {
 
     /// The response, these terms taken out.
     pub fn without(&self, terms: &[Term]) -> Vec<f64> {
-        let mut row = Vec::new();
         let samples = self.response.iter().zip(self.places.iter());
-        samples.map(|(y, place)| y - Term::sum(terms, place, &mut row)).collect()
+        samples.map(|(y, place)| y - Term::sum(terms, place)).collect()
     }
 
     /// With these terms beside the view's own nuisances: each is there by a standard normal number.
@@ -56,10 +55,9 @@ impl ViewData {
         if terms.is_empty() {
             return self;
         }
-        let mut row = Vec::new();
         let own = self.nuisance.chunks_exact(self.precision.len()).zip(self.places.iter());
         let with = |(own, place): (&[f64], &PixelContext)| {
-            let more = terms.iter().map(|t| finite(t.value(place, &mut row)));
+            let more = terms.iter().map(|t| finite(t.value(place)));
             own.iter().copied().chain(more).collect::<Vec<f64>>()
         };
         self.nuisance = own.flat_map(with).collect();
