@@ -21,8 +21,6 @@ use crate::terms::{Axis, Basis, Modulation, Term};
 /// the axis of a name is that name's shape, met better.
 pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
     let terms = terms_of(outcome, scene.statistic);
-    let values: Vec<Vec<Vec<f64>>> = terms.iter().map(|t| scene.values(t)).collect();
-    let responses = scene.responses();
     // Groups: who goes with whom.
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (k, c) in outcome.chosen.iter().enumerate() {
@@ -71,33 +69,20 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
         nameless && outcome.halves.as_ref().is_some_and(|h| h.contradict(group))
     };
     let told = groups.iter().filter(|group| !scattered(group));
-    told.map(|group| finding(scene, outcome, group, &terms, &values, &responses)).collect()
+    told.map(|group| finding(scene, outcome, group, &terms)).collect()
 }
 
 /// A name found after a curve on its axis stands for both if it had explained this share of it.
 const NEARLY: f64 = 0.4;
 
-fn finding(
-    scene: &Scene<'_>,
-    outcome: &Outcome,
-    group: &[usize],
-    terms: &[Term],
-    values: &[Vec<Vec<f64>>],
-    responses: &[Vec<f64>],
-) -> Finding {
+fn finding(scene: &Scene<'_>, outcome: &Outcome, group: &[usize], terms: &[Term]) -> Finding {
     let main = group[0];
     let chosen = &outcome.chosen[main];
     let axis = chosen.candidate.basis.axis();
-    let mine: Vec<Vec<f64>> = sum(group.iter().map(|&k| &values[k]));
-    let others: Vec<usize> = (0..terms.len()).filter(|k| !group.contains(k)).collect();
-    let rest: Vec<Vec<f64>> = sum(others.iter().map(|&k| &values[k]));
-    let left: Vec<Vec<f64>> = responses
-        .iter()
-        .enumerate()
-        .map(|(v, y)| {
-            y.iter().enumerate().map(|(i, y)| y - rest.get(v).map_or(0.0, |r| r[i])).collect()
-        })
-        .collect();
+    let own: Vec<Term> = group.iter().map(|&k| terms[k].clone()).collect();
+    let others = (0..terms.len()).filter(|k| !group.contains(k));
+    let others: Vec<Term> = others.map(|k| terms[k].clone()).collect();
+    let (mine, left) = (scene.values(&own), scene.without(&others));
     let along = Along::of(scene, &chosen.candidate.basis);
     let (status, effect, alternatives) = naming(chosen);
     let covariance = outcome.fit.as_ref().map(|f| {
@@ -131,7 +116,7 @@ fn finding(
         physics,
         shape,
         curve: Some(along.curve(scene, &left, &mine)),
-        terms: group.iter().map(|&k| terms[k].clone()).collect(),
+        terms: own,
         covariance: covariance_of(outcome, group),
         ..named(effect.unwrap_or_default(), scene.statistic, axis)
     }
@@ -146,24 +131,10 @@ fn covariance_of(outcome: &Outcome, group: &[usize]) -> Covariance {
     Covariance { fit: *fit, factors: factors.iter().map(of).collect(), variances: of(variances) }
 }
 
-fn sum<'a>(layers: impl Iterator<Item = &'a Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
-    let mut total: Vec<Vec<f64>> = Vec::new();
-    for layer in layers {
-        if total.is_empty() {
-            total = layer.clone();
-        } else {
-            for (t, l) in total.iter_mut().zip(layer) {
-                t.iter_mut().zip(l).for_each(|(t, l)| *t += l);
-            }
-        }
-    }
-    total
-}
-
 /// With how large it is and where, in these views; of a finding that is one term.
 pub fn placed(finding: Finding, scene: &Scene<'_>) -> Finding {
     let Some(term) = finding.terms.first() else { return finding };
-    let values = scene.values(term);
+    let values = scene.values(std::slice::from_ref(term));
     let interval = Along::of(scene, &term.basis).interval(scene, &values);
     Finding { interval, size: size(scene, &values), ..finding }
 }
@@ -183,7 +154,7 @@ pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
             basis: look.basis.clone(),
             coefficients: look.coefficients.clone(),
         };
-        let values = scene.values(&term);
+        let values = scene.values(std::slice::from_ref(&term));
         let along = Along::of(scene, &look.basis);
         MapRow {
             statistic: scene.statistic,

@@ -1,6 +1,7 @@
 //! The data that a layer's findings are measured on.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::diagnose::diagnosis::Size;
 use crate::diagnose::views::layers::Survey;
@@ -18,16 +19,17 @@ pub struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// A term's values, what the views' planes take taken out.
-    pub fn values(&self, term: &Term) -> Vec<Vec<f64>> {
-        self.levelled(|view| view.places.iter().map(|p| term.value(p)).collect())
+    /// The terms' values together, what the views' planes take taken out.
+    pub fn values(&self, terms: &[Term]) -> Vec<Vec<f64>> {
+        self.levelled(|view| view.places.iter().map(|p| Term::sum(terms, p)).collect())
     }
 
-    pub fn responses(&self) -> Vec<Vec<f64>> {
-        self.levelled(|view| view.response.clone())
+    /// What the terms leave of the responses, levelled alike.
+    pub fn without(&self, terms: &[Term]) -> Vec<Vec<f64>> {
+        self.levelled(|view| view.without(terms))
     }
 
-    fn levelled(&self, mut of: impl FnMut(&ViewData) -> Vec<f64>) -> Vec<Vec<f64>> {
+    fn levelled(&self, of: impl Fn(&ViewData) -> Vec<f64> + Sync) -> Vec<Vec<f64>> {
         let levelled = |view: &ViewData| {
             let mut values = of(view);
             if self.statistic == Statistic::Bias {
@@ -35,7 +37,7 @@ impl Scene<'_> {
             }
             values
         };
-        self.data.iter().map(levelled).collect()
+        self.data.par_iter().map(levelled).collect()
     }
 }
 

@@ -211,7 +211,7 @@ fn report(
     let (statistic, axis) = (scene.statistic, candidate.basis.axis());
     let coefficients = best.beta.as_slice().to_vec();
     let term = Term { statistic, basis: candidate.basis.clone(), coefficients };
-    let mut values = scene.values(&term);
+    let mut values = scene.values(std::slice::from_ref(&term));
     let others = (0..values.len()).filter(|v| !best.views.contains(v)).collect::<Vec<_>>();
     others.into_iter().for_each(|v| values[v].iter_mut().for_each(|x| *x = 0.0));
     let mut views: Vec<&str> =
