@@ -13,6 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::naming::{MIN_PROBABILITY, naming, temper};
+use super::pixels::terms_of;
 use crate::diagnose::diagnosis::Alternative;
 use crate::diagnose::search::candidate::{Candidate, RECALIBRATE};
 use crate::diagnose::search::choose::{as_good, behind, corrected};
@@ -20,10 +21,10 @@ use crate::diagnose::search::evidence::{Evidence, Gain, gain, root};
 use crate::diagnose::search::layer_search::{BIAS_PRIOR, VARIANCE_PRIOR};
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::outcome::{Chosen, Outcome, Rival};
-use crate::diagnose::search::prepared::{evidence_of_bases, without};
+use crate::diagnose::search::prepared::evidence_of_bases;
 use crate::diagnose::views::samples::ViewData;
 use crate::rng::Stream;
-use crate::terms::{Basis, Statistic};
+use crate::terms::{Basis, Statistic, Term};
 
 /// A name this probable needs no further view.
 pub const SURE: f64 = 0.9;
@@ -91,9 +92,9 @@ impl<'a> Contest<'a> {
             let c = &outcome.chosen[k];
             !std::ptr::eq(c, chosen) && !is_law(&c)
         });
-        let settled: Vec<(&Basis, Vec<f64>)> =
-            others.map(|k| (&outcome.chosen[k].candidate.basis, outcome.coefficients(k))).collect();
-        let left = |view: &ViewData| ViewData { response: without(view, &settled), ..view.clone() };
+        let terms = terms_of(outcome, statistic);
+        let settled: Vec<Term> = others.map(|k| terms[k].clone()).collect();
+        let left = |view: &ViewData| ViewData { response: view.without(&settled), ..view.clone() };
         let data: Vec<ViewData> = data.par_iter().map(left).collect();
         let beside: Vec<usize> = (0..bases.iter().map(|b| b.count()).sum()).collect();
         let in_doubt = stated.iter().filter_map(|a| {

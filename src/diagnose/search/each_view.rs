@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::evidence::{self, Evidence};
-use super::prepared::{Grouping, Prepared, prepare, without};
+use super::prepared::{Grouping, Prepared, prepare};
 use super::view_levels::scatter_of_most;
 use super::view_worth::{doubted, left_over};
 use crate::diagnose::finding::scene::Scene;
 use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
 use crate::diagnose::views::tiles::SIDE;
-use crate::terms::{Basis, PixelContext, Statistic};
+use crate::terms::{Basis, PixelContext, Statistic, Term};
 
 /// What lies behind a target may be taken for its rim so far from the edge, px, and no other view
 /// outvotes it.
@@ -36,12 +36,7 @@ pub struct Views<'a> {
 impl EachView {
     /// `excess` is how many times less sure each view is than its samples say, where lines or views
     /// err alike.
-    pub fn of(
-        scene: &Scene<'_>,
-        fine: &[ViewData],
-        shared: &[(&Basis, Vec<f64>)],
-        excess: &[f64],
-    ) -> Self {
+    pub fn of(scene: &Scene<'_>, fine: &[ViewData], shared: &[Term], excess: &[f64]) -> Self {
         let of_mean = scene.statistic == Statistic::Bias;
         let doubted = if of_mean { doubted(scene.survey) } else { vec![1.0; fine.len()] };
         let alone = |(n, v): (usize, &ViewData)| {
@@ -49,7 +44,7 @@ impl EachView {
             let sure = doubted[n] / excess.get(n).unwrap_or(&1.0);
             let weight =
                 v.places.iter().map(share).zip(&v.weight).map(|(s, w)| s * w * sure).collect();
-            ViewData { response: without(v, shared), weight, ..v.clone() }
+            ViewData { response: v.without(shared), weight, ..v.clone() }
         };
         let mut fine: Vec<ViewData> = fine.iter().enumerate().map(alone).collect();
         if !of_mean && let Some(whole) = fine.first().and_then(|v| v.precision.first()) {

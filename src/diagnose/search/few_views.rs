@@ -18,6 +18,7 @@ use super::rules::Rules;
 use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::finding::along::Along;
 use crate::diagnose::finding::other_findings::of_names;
+use crate::diagnose::finding::pixels::terms_of;
 use crate::diagnose::finding::scene::{Scene, size};
 use crate::diagnose::views::samples::ViewData;
 use crate::rng::{Seed, Stream};
@@ -133,10 +134,7 @@ pub fn few_views(
     excess: &[f64],
     seed: Seed,
 ) -> Option<Finding> {
-    let chosen = outcome.chosen.iter().enumerate();
-    let shared: Vec<(&Basis, Vec<f64>)> =
-        chosen.map(|(k, c)| (&c.candidate.basis, outcome.coefficients(k))).collect();
-    let each = EachView::of(scene, fine, &shared, excess);
+    let each = EachView::of(scene, fine, &terms_of(outcome, scene.statistic), excess);
     let views = each.prepared(rules.prior);
     let left_open = rules.learnt_from.map_or(1.0, |model| model.excess(fine.len() as f64));
     let tried: Vec<Tried<'_>> = candidates

@@ -28,7 +28,7 @@ use rayon::prelude::*;
 
 use crate::diagnose::views::samples::ViewData;
 use crate::rng::Seed;
-use crate::terms::Basis;
+use crate::terms::{Basis, Term};
 use candidate::Candidate;
 use choose::Choice;
 use evidence::{Evidence, fit, gain};
@@ -129,7 +129,7 @@ impl<'a> Layer<'a> {
     /// and are taken out as they were fitted.
     fn prepare(&self, chosen: &[Chosen]) -> Vec<Prepared<'_>> {
         let named = bases_where(chosen, |c| c.family.is_some());
-        let mut settled: Vec<(&Basis, Vec<f64>)> = Vec::new();
+        let mut settled: Vec<Term> = Vec::new();
         if named.len() < chosen.len()
             && let Some(beta) = fit(&self.together.evidence(&bases(chosen)), self.rules.prior)
         {
@@ -138,7 +138,8 @@ impl<'a> Layer<'a> {
                 let (mine, others) = rest.split_at(basis.count());
                 rest = others;
                 if family.is_none() {
-                    settled.push((basis, mine.to_vec()));
+                    // Of the mean or of the variance, it is taken out alike.
+                    settled.push(Term::bias(basis.clone(), mine.to_vec()));
                 }
             }
         }

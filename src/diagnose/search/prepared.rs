@@ -10,7 +10,7 @@ use super::evidence::Evidence;
 use super::rows::Rows;
 use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::tiles::SIDE;
-use crate::terms::{Basis, Coordinate, PixelContext};
+use crate::terms::{Basis, Coordinate, PixelContext, Term};
 
 /// Evidence of views on given terms together.
 pub fn evidence_of_bases(data: &[ViewData], bases: &[&Basis]) -> Vec<Evidence> {
@@ -58,17 +58,6 @@ pub struct Prepared<'a> {
     pub coarse: (&'a [PixelContext], Rows<'a>),
     /// The fine samples gathered by one coordinate.
     groups: Vec<(&'a Grouping, Rows<'a>)>,
-}
-
-/// A view's response, terms with these coefficients taken out.
-pub fn without(view: &ViewData, settled: &[(&Basis, Vec<f64>)]) -> Vec<f64> {
-    let mut response = view.response.clone();
-    for (basis, beta) in settled {
-        for (y, place) in response.iter_mut().zip(view.places.iter()) {
-            *y -= basis.value(beta, place);
-        }
-    }
-    response
 }
 
 /// Side of a neighbourhood in patches: few nodes of a curve or a map are within it.
@@ -119,9 +108,9 @@ pub fn prepare<'a>(
     groups: &'a [Grouping],
     keep_fine: bool,
     beside: &[&Basis],
-    settled: &[(&Basis, Vec<f64>)],
+    settled: &[Term],
 ) -> Option<Prepared<'a>> {
-    let left = without(fine, settled);
+    let left = fine.without(settled);
     let left_coarse = if coarse.gathered.is_empty() {
         left.clone()
     } else {

@@ -8,12 +8,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::prepared::without;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::stats::quantile;
-use crate::terms::Basis;
+use crate::terms::{Basis, Term};
 
 /// A view worth so many times less than the others may have a cause of its own. In the ray-traced session
 /// that this was read off, the eight views without one were within two fifths of their middle.
@@ -47,7 +46,7 @@ fn doubts(inflations: &[f64]) -> Vec<f64> {
 /// and eight samples across, so that errors which hang together count as they do. Infinite where too few
 /// patches of any size are seen.
 pub fn left_over(view: &ViewData, basis: &Basis, beta: &[f64]) -> f64 {
-    let left = without(view, &[(basis, beta.to_vec())]);
+    let left = view.without(&[Term::bias(basis.clone(), beta.to_vec())]);
     let Some(plane) = view.plane_of(&left) else { return f64::INFINITY };
     let at_scale = |across: f64| {
         let mut patches: BTreeMap<[u32; 2], [f64; 2]> = BTreeMap::new();
