@@ -76,3 +76,29 @@ fn a_lift_has_no_straight_part() {
     let place = PixelContext { right: 0.3, disparity: 40.0, rho: 2.0, ..PixelContext::default() };
     assert!(basis.value(&line, &place).abs() < 1e-10);
 }
+
+/// A ring closes; a table is its numbers; powers have their constant second.
+#[test]
+fn known_values() {
+    let ring = Basis::Ring { over: OVER, period: 3.0, nodes: 5, times: Modulation::One };
+    let nodes = [1.0, -2.0, 0.5, 4.0, 7.0];
+    let depths = (0..TABLE * TABLE).map(|k| (k % TABLE) as f64).collect();
+    let table = Basis::Table { z_m: [0.5, 2.5], theta_rad: [0.0, 1.0], columns: vec![depths] };
+    let (over, times) = (OVER, Modulation::Tilt);
+    let powers = Basis::Powers { over, orders: 3, level: true, times };
+    for k in 0..10 {
+        let at = |turned: f64| PixelContext { disparity: 0.6 * turned, ..Default::default() };
+        let middle = 0.5 * (nodes[k % 5] + nodes[(k + 1) % 5]);
+        assert!((ring.value(&nodes, &at(k as f64)) - nodes[k % 5]).abs() < 1e-9, "{k}");
+        assert!((ring.value(&nodes, &at(k as f64 + 0.5)) - middle).abs() < 1e-9, "{k}");
+    }
+    for p in places() {
+        let (d, tilt) = (p.disparity, 0.4f64.sin());
+        let expected = 2.0 * (8.0 * (p.z - 0.5)).min(16.0);
+        assert!((table.value(&[2.0], &p) - expected).abs() < 1e-9, "{p:?}");
+        let mut row = [0.0; 4];
+        powers.fill(&p, &mut row);
+        let expected = [d, 1.0, d * d, d * d * d].map(|x| tilt * x);
+        assert!(row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs()), "{row:?}");
+    }
+}
