@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::fleet::{
@@ -59,7 +59,8 @@ fn report_sigma(sigma: &SharedSigma) {
         result(format!("{name:width$}{}", cells.concat()));
     };
     let at = |i: usize| &sigma.places[i];
-    row("", &|i| format!("{:.2} m, {:.0} deg", at(i).z_m, at(i).theta_rad.to_degrees()));
+    let place = |i: usize| place(at(i).z_m, at(i).theta_rad);
+    row("", &place);
     for (k, standing) in sigma.standings.iter().enumerate() {
         row(&standing.unit, &|i| {
             let unit = &at(i).units[k];
@@ -67,29 +68,18 @@ fn report_sigma(sigma: &SharedSigma) {
         });
     }
     row("in common", &|i| format!("{:.3}", 1e3 * at(i).common_m));
-    row("  95 %", &|i| {
-        let [low, high] = at(i).common_interval_m;
-        format!("{:.3} to {:.3}", 1e3 * low, 1e3 * high)
-    });
+    let span = |[low, high]: [f64; 2], digits: usize| format!("{low:.digits$} to {high:.digits$}");
+    row("  95 %", &|i| span(mm(at(i).common_interval_m), 3));
     row("units scatter", &|i| format!("{:.1} %", 1e2 * at(i).scatter));
-    row("  95 %", &|i| {
-        let [low, high] = at(i).scatter_interval;
-        format!("{:.1} to {:.1}", 1e2 * low, 1e2 * high)
-    });
+    row("  95 %", &|i| span(at(i).scatter_interval.map(|v| 1e2 * v), 1));
     report_standings("sigma", &sigma.standings, &|k| {
         let departure = |i: &usize| at(*i).units[k].departure;
         let places = 0..sigma.places.len();
         let largest = places.max_by(|a, b| departure(a).abs().total_cmp(&departure(b).abs()));
         largest.map_or(String::new(), |i| {
-            let ([low, high], place) = (at(i).units[k].departure_interval, at(i));
-            format!(
-                "{:+.0} % ({:+.0} to {:+.0}) at {:.2} m, {:.0} deg",
-                1e2 * departure(&i),
-                1e2 * low,
-                1e2 * high,
-                place.z_m,
-                place.theta_rad.to_degrees()
-            )
+            let [low, high] = at(i).units[k].departure_interval;
+            let [off, low, high] = [departure(&i), low, high].map(|v| 1e2 * v);
+            format!("{off:+.0} % ({low:+.0} to {high:+.0}) at {}", place(i))
         })
     });
 }
@@ -98,16 +88,12 @@ fn report_bias(bias: &SharedBias) {
     result("\nbias of depth over the picture, mm rms");
     for d in &bias.distances {
         let of = |u: &BiasOfUnit| {
-            format!("{} {:.2} (error {:.2})", u.unit, 1e3 * u.rms_m, 1e3 * u.error_rms_m)
+            let [rms, error] = mm([u.rms_m, u.error_rms_m]);
+            format!("{} {rms:.2} (error {error:.2})", u.unit)
         };
-        let units: Vec<String> = d.units.iter().map(of).collect();
-        result(format!(
-            "{:.2} m: in common {:.2}, units scatter {:.2}; {}",
-            d.z_m,
-            1e3 * d.common_rms_m,
-            1e3 * d.scatter_rms_m,
-            units.join(", ")
-        ));
+        let units = d.units.iter().map(of).collect::<Vec<_>>().join(", ");
+        let (z, [common, scatter]) = (d.z_m, mm([d.common_rms_m, d.scatter_rms_m]));
+        result(format!("{z:.2} m: in common {common:.2}, units scatter {scatter:.2}; {units}"));
     }
     report_standings("bias", &bias.standings, &|k| {
         bias.distances.last().map_or(String::new(), |d| {
@@ -118,23 +104,23 @@ fn report_bias(bias: &SharedBias) {
 
 /// Who shares it, and who has its own; `how_far` off the others a unit is.
 fn report_standings(what: &str, standings: &[Standing], how_far: &dyn Fn(usize) -> String) {
-    let names = |own: bool| -> Vec<&str> {
-        standings.iter().filter(|s| s.is_own == own).map(|s| s.unit.as_str()).collect()
-    };
-    match names(false)[..] {
-        [] => result(format!("no two units share a {what}: each needs its own model")),
-        ref core => {
-            result(format!("in common: {} share one {what} within the errors", core.join(", ")))
-        }
+    let core = standings.iter().filter(|s| !s.is_own).map(|s| s.unit.as_str());
+    match &*core.collect::<Vec<_>>().join(", ") {
+        "" => result(format!("no two units share a {what}: each needs its own model")),
+        core => result(format!("in common: {core} share one {what} within the errors")),
     }
     for (k, s) in standings.iter().enumerate().filter(|(_, s)| s.is_own) {
-        result(format!(
-            "its own: {} has another {what}: {}, {}",
-            s.unit,
-            how_far(k),
-            p(s.p_adjusted)
-        ));
+        let (unit, far, p) = (&s.unit, how_far(k), p(s.p_adjusted));
+        result(format!("its own: {unit} has another {what}: {far}, {p}"));
     }
+}
+
+fn mm<const N: usize>(metres: [f64; N]) -> [f64; N] {
+    metres.map(|v| 1e3 * v)
+}
+
+fn place(z_m: f64, theta_rad: f64) -> String {
+    format!("{z_m:.2} m, {:.0} deg", theta_rad.to_degrees())
 }
 
 fn p(p: f64) -> String {
@@ -169,41 +155,25 @@ fn report_effect(effect: &SharedEffect) {
 
 fn report_change(change: &Change) {
     let day = |created: &str| created.split('T').next().unwrap_or_default().to_string();
-    let span = format!(
-        "{}, {} ({}) to {} ({})",
-        change.unit,
-        day(&change.from_created),
-        change.from.display(),
-        day(&change.to_created),
-        change.to.display()
-    );
-    result(span);
-    let sigma = &change.sigma;
-    let verdict = |changed: bool| if changed { "has changed" } else { "no change found" };
-    let places = sigma.places.iter().map(|at| {
-        let [low, high] = at.interval_m;
-        format!(
-            "    {:.2} m, {:.0} deg: {:.2} to {:.2} mm, {:+.2} mm (95 %: {:+.2} to {:+.2})",
-            at.z_m,
-            at.theta_rad.to_degrees(),
-            1e3 * at.from_m,
-            1e3 * at.to_m,
-            1e3 * at.change_m,
-            1e3 * low,
-            1e3 * high
-        )
-    });
-    result(format!("  sigma: {} ({})", verdict(sigma.changed), p(sigma.p_adjusted)));
-    places.for_each(result);
+    let of = |created: &str, file: &Path| format!("{} ({})", day(created), file.display());
+    let [from, to] = [of(&change.from_created, &change.from), of(&change.to_created, &change.to)];
+    result(format!("{}, {from} to {to}", change.unit));
+    let verdict = |what: &str, changed: bool, p_adjusted: f64| {
+        let verdict = if changed { "has changed" } else { "no change found" };
+        result(format!("  {what}: {verdict} ({})", p(p_adjusted)));
+    };
+    verdict("sigma", change.sigma.changed, change.sigma.p_adjusted);
+    for at in &change.sigma.places {
+        let ([low, high], [from, to, by]) =
+            (mm(at.interval_m), mm([at.from_m, at.to_m, at.change_m]));
+        let moved = format!("{from:.2} to {to:.2} mm, {by:+.2} mm (95 %: {low:+.2} to {high:+.2})");
+        result(format!("    {}: {moved}", place(at.z_m, at.theta_rad)));
+    }
     if let Some(bias) = &change.bias {
-        result(format!("  bias: {} ({})", verdict(bias.changed), p(bias.p_adjusted)));
+        verdict("bias", bias.changed, bias.p_adjusted);
         for at in &bias.distances {
-            result(format!(
-                "    {:.2} m: by {:.2} mm rms over the picture (error {:.2})",
-                at.z_m,
-                1e3 * at.change_rms_m,
-                1e3 * at.error_rms_m
-            ));
+            let (z, [by, error]) = (at.z_m, mm([at.change_rms_m, at.error_rms_m]));
+            result(format!("    {z:.2} m: by {by:.2} mm rms over the picture (error {error:.2})"));
         }
     }
     for (ids, when) in [(&change.found_now, "now"), (&change.found_then, "then")] {
