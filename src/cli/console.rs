@@ -6,13 +6,13 @@ use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use kinoise::units::counted;
-use kinoise::{NoiseModel, Progress, Recording, Watch};
+use kinoise::{Camera, NoiseModel, Progress, Recording, Sensor, Watch};
 
 #[derive(Debug, Args)]
 pub struct Verbosity {
@@ -32,11 +32,7 @@ static LEVEL: AtomicU8 = AtomicU8::new(USUAL);
 impl Verbosity {
     /// From here on, for the whole process.
     pub fn set(&self) {
-        let level = match (self.quiet, self.verbose) {
-            (true, _) => QUIET,
-            (_, true) => VERBOSE,
-            _ => USUAL,
-        };
+        let level = USUAL + u8::from(self.verbose) - u8::from(self.quiet);
         LEVEL.store(level, Ordering::Relaxed);
     }
 }
@@ -78,10 +74,9 @@ fn short_numbers(text: &str) -> String {
         let (before, number) = rest.split_at(begin);
         let count = number.find(|c: char| !c.is_ascii_digit()).unwrap_or(number.len());
         short += before;
-        if count > MAX_DIGITS {
-            short += &format!("{}... ({count} digits)", &number[..SHOWN_DIGITS]);
-        } else {
-            short += &number[..count];
+        match count > MAX_DIGITS {
+            true => short += &format!("{}... ({count} digits)", &number[..SHOWN_DIGITS]),
+            false => short += &number[..count],
         }
         rest = &number[count..];
     }
@@ -99,11 +94,7 @@ pub fn one_line(text: &str) -> String {
     let head: String = text.chars().take(half).collect();
     let tail: String = text.chars().skip(count - half).collect();
     let cut = count - 2 * half;
-    format!(
-        "{} ... ({cut} characters) ... {}",
-        escaped(&head, |_| false),
-        escaped(&tail, |_| false)
-    )
+    escaped(&format!("{head} ... ({cut} characters) ... {tail}"), |_| false)
 }
 
 /// One line. What would end it within, in somebody's name, is made visible; an empty line before or
@@ -155,20 +146,11 @@ pub fn detail(line: impl AsRef<str>) {
 }
 
 pub fn detail_recording(recording: &Recording) {
-    let (sensor, camera) = (&recording.sensor, &recording.sensor.camera);
-    detail(format!(
-        "read {}: {}, {}, {} x {} px, fx {} fy {} cx {} cy {}, {:?}",
-        recording.root.display(),
-        sensor.name,
-        counted(recording.views.len(), "view"),
-        camera.width,
-        camera.height,
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
-        sensor.code
-    ));
+    let (root, views) = (recording.root.display(), counted(recording.views.len(), "view"));
+    let Sensor { name, camera, code, .. } = &recording.sensor;
+    let Camera { width, height, fx, fy, cx, cy, .. } = camera;
+    let lens = format!("{width} x {height} px, fx {fx} fy {fy} cx {cx} cy {cy}");
+    detail(format!("read {root}: {name}, {views}, {lens}, {code:?}"));
 }
 
 pub fn detail_model(model: &NoiseModel, file: Option<&Path>) {
@@ -223,6 +205,10 @@ struct Stages {
 }
 
 impl Stages {
+    fn now(&self) -> MutexGuard<'_, (&'static str, Instant)> {
+        self.now.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn show(&self, stage: &'static str) {
         self.bar.reset();
         self.bar.unset_length();
@@ -237,7 +223,7 @@ impl Stages {
     }
 
     fn end(&self) {
-        let (stage, begun) = *self.now.lock().unwrap_or_else(PoisonError::into_inner);
+        let (stage, begun) = *self.now();
         let seconds = begun.elapsed().as_secs_f64();
         self.bar.suspend(|| detail(format!("{stage}: {seconds:.1} s")));
     }
@@ -246,13 +232,11 @@ impl Stages {
 impl Watch for Stages {
     fn stage(&self, name: &'static str) {
         // What the first stage is called is said twice: by who starts the work, and by the work.
-        let same = self.now.lock().unwrap_or_else(PoisonError::into_inner).0 == name;
-        if same {
-            return;
+        if self.now().0 != name {
+            self.end();
+            *self.now() = (name, Instant::now());
+            self.show(name);
         }
-        self.end();
-        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = (name, Instant::now());
-        self.show(name);
     }
 
     fn step(&self, done: usize, all: usize) {
