@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
-use kinoise::report::{comparison_figures, comparison_page};
+use kinoise::report::{comparison_charts, comparison_page};
 use kinoise::sequence::open;
 
 use super::common::{Global, Input, Model, Thinning, count};
@@ -56,8 +56,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let json = tables::json(&comparison);
     output.write("tables.json", serde_json::to_string_pretty(&json)?.as_bytes())?;
     output.write("tables.txt", text.as_bytes())?;
-    for (name, svg) in comparison_figures(&comparison)? {
-        output.write(name, svg.as_bytes())?;
+    for (name, chart) in comparison_charts(&comparison) {
+        output.write(name, chart.svg()?.as_bytes())?;
     }
     let origin = origin(&arguments.sequence, global.seed().0);
     output.write("report.html", comparison_page(&comparison, &origin)?.as_bytes())?;

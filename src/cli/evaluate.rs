@@ -148,16 +148,8 @@ fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow
 
 fn report(evaluation: &Evaluation, delta: Delta) {
     let line = |name: &str, s: &Spread, unit: &str| {
-        result(format!(
-            "{name} {unit}: rmse {:.6}  mean {:.6}  median {:.6}  std {:.6}  min {:.6}  max {:.6}  of {}",
-            s.rmse,
-            s.mean,
-            s.median,
-            s.std,
-            s.min,
-            s.max,
-            counted(s.pairs, "pair")
-        ));
+        let figures = s.figures().map(|(figure, v)| format!("{figure} {v:.6}")).join("  ");
+        result(format!("{name} {unit}: {figures}  of {}", counted(s.pairs, "pair")));
     };
     let interval = format!("RPE over {delta},");
     line("ATE after alignment,", &evaluation.ate.error, "m");
@@ -184,10 +176,6 @@ pub fn as_json(evaluation: &Evaluation) -> Value {
 }
 
 fn spread(s: &Spread, unit: &str) -> Value {
-    let names = ["rmse", "mean", "median", "std", "min", "max"];
-    let figures = names.into_iter().zip([s.rmse, s.mean, s.median, s.std, s.min, s.max]);
-    let mut object: serde_json::Map<String, Value> =
-        figures.map(|(name, v)| (format!("{name}_{unit}"), json!(v))).collect();
-    object.insert("pairs".into(), json!(s.pairs));
-    Value::Object(object)
+    let figures = s.figures().map(|(name, v)| (format!("{name}_{unit}"), json!(v)));
+    figures.into_iter().chain([("pairs".into(), json!(s.pairs))]).collect()
 }

@@ -43,9 +43,9 @@ pub fn tables(comparison: &Comparison) -> Vec<Table> {
         .map(|(title, of)| {
             let mut rows: Vec<TableRow> = comparison.rows.iter().map(|r| spreads(r, *of)).collect();
             let (name, remark) = ("(a camera that stands still)", String::new());
-            rows.push(TableRow { name, figures: figures(&of(&comparison.still)), remark });
-            let columns = ["rmse", "mean", "median", "std", "min", "max"].map(|c| (c, 3));
-            Table { title, columns: columns.into(), rows }
+            let still = of(&comparison.still).figures();
+            rows.push(TableRow { name, figures: still.map(|(_, v)| v).into(), remark });
+            Table { title, columns: still.map(|(name, _)| (name, 3)).into(), rows }
         })
         .collect();
     let work = |row: &Row| match row.runs.first() {
@@ -89,7 +89,7 @@ fn spreads(row: &Row, of: Column) -> TableRow {
         return TableRow { name, figures: Vec::new(), remark: failure(row) };
     }
     let n = spreads.len() as f64;
-    let mean = |k: usize| spreads.iter().map(|s| figures(s)[k]).sum::<f64>() / n;
+    let mean = |k: usize| spreads.iter().map(|s| s.figures()[k].1).sum::<f64>() / n;
     let means: Vec<f64> = (0..6).map(mean).collect();
     let mut remark = String::new();
     if spreads.len() > 1 {
@@ -98,10 +98,6 @@ fn spreads(row: &Row, of: Column) -> TableRow {
         remark = format!("   ± {deviation:.3} over {} runs", spreads.len());
     }
     TableRow { name, figures: means, remark }
-}
-
-fn figures(s: &Spread) -> Vec<f64> {
-    vec![s.rmse, s.mean, s.median, s.std, s.min, s.max]
 }
 
 fn failure(row: &Row) -> String {

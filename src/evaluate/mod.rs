@@ -115,15 +115,16 @@ impl Spread {
     }
 
     pub fn scaled(&self, factor: f64) -> Self {
-        Spread {
-            rmse: self.rmse * factor,
-            mean: self.mean * factor,
-            median: self.median * factor,
-            std: self.std * factor,
-            min: self.min * factor,
-            max: self.max * factor,
-            pairs: self.pairs,
-        }
+        let [rmse, mean, median, std, min, max] = self.figures().map(|(_, v)| v * factor);
+        Spread { rmse, mean, median, std, min, max, pairs: self.pairs }
+    }
+
+    /// By name, as the TUM scripts order them.
+    pub fn figures(&self) -> [(&'static str, f64); 6] {
+        let Spread { rmse, mean, median, std, min, max, .. } = *self;
+        let names = ["rmse", "mean", "median", "std", "min", "max"];
+        let figures = [rmse, mean, median, std, min, max];
+        [0, 1, 2, 3, 4, 5].map(|k| (names[k], figures[k]))
     }
 }
 

@@ -5,36 +5,25 @@ use nalgebra::Vector3;
 
 use super::chart::{Chart, Stroke};
 use super::colours::{self, INK};
-use super::document::{Origin, document, figure, list, prose, section, table};
-use super::numbers::{MM, fixed};
+use super::document::{Origin, beside, document, figure, list, prose, section, table};
+use super::numbers::{ABSENT, MM, fixed};
 use super::trajectories::{Line, chart};
 use crate::compare::{Comparison, Row, Run, tables};
 use crate::error::Result;
 use crate::trajectory::Pose;
-
-/// Fig. 6 (paths from above), Fig. 7 (ATE over time) and Fig. 8 (RPE over time), by file name.
-///
-/// # Errors
-/// When plotters fails.
-pub fn comparison_figures(comparison: &Comparison) -> Result<Vec<(&'static str, String)>> {
-    charts(comparison).into_iter().map(|(name, chart)| Ok((name, chart.svg()?))).collect()
-}
 
 /// The page: tables and figures, one self-contained file.
 ///
 /// # Errors
 /// When plotters fails.
 pub fn comparison_page(comparison: &Comparison, origin: &Origin) -> Result<String> {
-    let [paths, over_time @ ..] = charts(comparison).map(|(_, chart)| chart);
-    let paths = figure(&paths, &paths.title)?;
-    let figures = over_time.iter().map(|chart| figure(chart, &chart.title));
-    let figures = figures.collect::<Result<Vec<_>>>()?;
+    let [paths, over_time @ ..] = comparison_charts(comparison).map(|(_, chart)| chart);
     let title = format!("Mapping {}, variant by variant", comparison.sequence);
     let body = html! {
         h1 { (title) }
         p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
             go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
-        (section("Figures", &html! { (paths) div.beside { @for figure in figures { (figure) } } }))
+        (section("Figures", &html! { (figure(&paths, &paths.title)?) (beside(&over_time)?) }))
         @for part in tables::tables(comparison) { (section(part.title, &table_of(&part))) }
         @if !comparison.remarks.is_empty() {
             (section("Notes", &list(comparison.remarks.iter().map(|remark| prose(remark)))))
@@ -49,24 +38,18 @@ fn table_of(part: &tables::Table) -> Markup {
     let remarks = part.rows.iter().any(|row| !row.remark.is_empty());
     titles.extend(remarks.then(|| "~remark".to_string()));
     let cells = |row: &tables::TableRow| {
-        let mut cells = vec![html! { (row.name) }];
-        cells.extend(part.columns.iter().enumerate().map(|(i, (_, decimals))| {
-            html! {
-                @if let Some(v) = row.figures.get(i) { (fixed(*v, *decimals)) } @else { "–" }
-            }
-        }));
-        cells.push(prose(row.remark.trim()));
-        cells
+        let figure = |(i, (_, decimals)): (usize, &(_, usize))| {
+            row.figures.get(i).map_or(ABSENT.into(), |v| fixed(*v, *decimals))
+        };
+        let figures = part.columns.iter().enumerate().map(figure).map(|text| html! { (text) });
+        let remark = remarks.then(|| prose(row.remark.trim()));
+        [html! { (row.name) }].into_iter().chain(figures).chain(remark).collect()
     };
-    let rows = part.rows.iter().map(|row| {
-        let mut cells = cells(row);
-        cells.truncate(titles.len());
-        cells
-    });
-    table(&titles, rows.collect::<Vec<_>>())
+    table(&titles, part.rows.iter().map(cells))
 }
 
-fn charts(comparison: &Comparison) -> [(&'static str, Chart); 3] {
+/// Fig. 6 (paths from above), Fig. 7 (ATE over time) and Fig. 8 (RPE over time), by file name.
+pub fn comparison_charts(comparison: &Comparison) -> [(&'static str, Chart); 3] {
     let ate = "Fig. 7. Absolute trajectory error";
     let rpe = "Fig. 8. Relative pose error over 1 s";
     [

@@ -196,6 +196,13 @@ pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
     Ok(html! { figure { (drawing) @if let Some(words) = caption { figcaption { (words) } } } })
 }
 
+/// Charts with their titles, beside each other where there is room.
+pub(super) fn beside(charts: &[Chart]) -> Result<Markup> {
+    let figures = charts.iter().map(|chart| figure(chart, &chart.title));
+    let figures = figures.collect::<Result<Vec<Markup>>>()?;
+    Ok(html! { div.beside { @for figure in figures { (figure) } } })
+}
+
 /// A chart without a caption.
 pub(super) fn drawing(chart: &Chart, label: &str) -> Result<Markup> {
     let narrow = chart.narrow().map(|c| c.svg()).transpose()?;

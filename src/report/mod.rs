@@ -24,7 +24,7 @@ mod trajectories;
 pub use axis::Axis;
 pub use calibration_page::{CalibrationPage, calibration_page};
 pub use chart::Chart;
-pub use comparison::{comparison_figures, comparison_page};
+pub use comparison::{comparison_charts, comparison_page};
 pub use diagnosis_page::{DiagnosisPage, Step, called, diagnosis_page, story};
 pub use document::Origin;
 pub use map_page::{MapPage, map_page};

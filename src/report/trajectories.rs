@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::axis::Axis;
 use super::chart::{Chart, Entry, Layer, Sample, Stroke};
 use super::colours::{ACCENT, INK, line};
-use super::document::{Origin, document, figure, list, prose, section, table, tiles};
+use super::document::{Origin, beside, document, figure, list, prose, section, table, tiles};
 use super::numbers::{MM, decimals_for, fixed};
 use crate::error::Result;
 use crate::evaluate::{Delta, Evaluation, Spread};
@@ -108,8 +108,7 @@ impl Against<'_> {
     pub(super) fn parts(&self) -> Result<Markup> {
         let e = self.evaluation;
         let row = |name: String, s: Spread| -> Vec<Markup> {
-            let figures = [s.rmse, s.mean, s.median, s.std, s.min, s.max];
-            let figures = figures.map(|v| html! { (fixed(v, 3)) });
+            let figures = s.figures().map(|(_, v)| html! { (fixed(v, 3)) });
             [html! { (name) }].into_iter().chain(figures).chain([html! { (s.pairs) }]).collect()
         };
         let over = self.delta;
@@ -133,8 +132,6 @@ impl Against<'_> {
         ];
         let [paths, over_time @ ..] = self.charts().map(|(_, chart)| chart);
         let paths = figure(&paths, "both paths, seen along the axis of least motion")?;
-        let figures = over_time.iter().map(|chart| figure(chart, &chart.title));
-        let figures = figures.collect::<Result<Vec<Markup>>>()?;
         Ok(html! {
             (tiles(tiled))
             (section("Errors", &html! {
@@ -147,7 +144,7 @@ impl Against<'_> {
                     (list(self.evaluation.remarks.iter().map(|remark| prose(remark))))
                 }
             }))
-            (section("Over time", &html! { div.beside { @for figure in figures { (figure) } } }))
+            (section("Over time", &beside(&over_time)?))
             (section("Both paths", &paths))
         })
     }
