@@ -267,11 +267,8 @@ fn measured(recording: &Recording, m: &Measurements) -> String {
     let frames: usize = m.views.iter().map(|v| v.frames).sum();
     let [f0, f1] = range(&|v| v.frames as f64);
     let each = if f0 == f1 { format!("{f0} a view") } else { format!("{f0} to {f1} a view") };
-    let (name, views, all) =
-        (&recording.sensor.name, m.views.len(), m.views.len() + m.excluded.len());
-    format!(
-        "{name}: {views} of {} measured, {} ({each}), z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees",
-        counted(all, "view"),
-        counted(frames, "frame")
-    )
+    let (name, views, frames) = (&recording.sensor.name, m.views.len(), counted(frames, "frame"));
+    let all = counted(views + m.excluded.len(), "view");
+    let places = format!("z {z0:.2} to {z1:.2} m, tilt {t0:.1} to {t1:.1} degrees");
+    format!("{name}: {views} of {all} measured, {frames} ({each}), {places}")
 }

@@ -23,7 +23,7 @@ use super::common::{Global, source_date};
 use super::console::{next_step, result, result_lines, say, say_lines, shell, working};
 use super::demo_seal::Sealed;
 use super::diagnose::{HeldAgainst, examine};
-use super::map::{Title, follow};
+use super::map::follow;
 use super::output::{DEMO, DIAGNOSIS, MAP, begin};
 
 #[derive(Debug, Args)]
@@ -194,7 +194,7 @@ fn mapped(
     let plain = Options { seed, ..Options::paper(Weights::None, Init::None) };
     let best = Options { seed, ..Options::best() };
     result("point-to-plane ICP from frame to frame, without the model:");
-    let named = |title| Title { title, model: "model.json of this demo".into() };
+    let named = |title| [title, "model.json of this demo"];
     let map = |name: &str| begin(&output.join(name), MAP, &[], global);
     follow(&sequence, model, &plain, named("The office, plain ICP"), map("map-plain")?)?;
     result("with the model, each frame to the map so far:");

@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let inputs: Vec<&Path> =
         arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
     let out = begin(&arguments.output, MAP, &inputs, global)?;
-    let named = Title { title: &title, model: arguments.model.described(&model) };
+    let named = [&*title, &arguments.model.described(&model)];
     let stats = follow(&sequence, &model, &options, named, out)?;
     global.print_json(&stats)?;
     // With true poses there is something to compare with; without them, the same without the model.
@@ -149,18 +149,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the page is called, and what it calls the model.
-pub struct Title<'a> {
-    pub title: &'a str,
-    pub model: String,
-}
-
-/// Map, write every output, report; what stats.json says.
+/// Map, write every output, report; what stats.json says. The page has a `title`, and calls the model
+/// as it is `named`.
 pub fn follow(
     sequence: &Sequence,
     model: &NoiseModel,
     options: &Options,
-    Title { title, model: named }: Title<'_>,
+    [title, named]: [&str; 2],
     output: OutputFolder,
 ) -> anyhow::Result<Value> {
     detail(format!("settings: {options:?}"));
@@ -173,18 +168,14 @@ pub fn follow(
     let trajectory = mapped.trajectory();
     output.write("trajectory.txt", tum_text(&trajectory).as_bytes())?;
     output.write("map.ply", &ply(&mapped.map))?;
+    let (truth, estimate, delta) = (&*sequence.truth, &*trajectory, DELTA);
     let evaluation = against.as_ref().and_then(|t| t.as_ref().ok());
     let page = MapPage {
         title,
         points: &mapped.map,
         frames: &mapped.frames,
-        against: evaluation.map(|evaluation| Against {
-            truth: &sequence.truth,
-            estimate: &trajectory,
-            evaluation,
-            delta: DELTA,
-        }),
-        model: &named,
+        against: evaluation.map(|evaluation| Against { truth, estimate, evaluation, delta }),
+        model: named,
         origin: &origin(&sequence.root, options.seed.0),
     };
     output.write("map.html", map_page(&page)?.as_bytes())?;
@@ -202,31 +193,25 @@ const DELTA: Delta = Delta::Seconds(1.0);
 
 /// Against the sequence's own true poses, where it has any.
 fn truth(sequence: &Sequence, mapped: &Mapped) -> Option<Result<Evaluation, String>> {
-    if sequence.truth.is_empty() {
-        return None;
-    }
-    let evaluation = evaluate(&sequence.truth, &mapped.trajectory(), DELTA);
-    Some(evaluation.map_err(|e| e.to_string()))
+    let evaluation = || evaluate(&sequence.truth, &mapped.trajectory(), DELTA);
+    (!sequence.truth.is_empty()).then(|| evaluation().map_err(|e| e.to_string()))
 }
 
 fn report(mapped: &Mapped, against: &Option<Result<Evaluation, String>>, output: &Path) {
     match against {
-        Some(Ok(evaluation)) => result(format!(
-            "against the ground truth: ATE {:.4} m, RPE over 1 s {:.4} m and {:.3} degrees (rmse)",
-            evaluation.ate.error.rmse,
-            evaluation.rpe.translation.rmse,
-            evaluation.rpe.rotation.rmse.to_degrees()
-        )),
+        Some(Ok(Evaluation { ate, rpe, .. })) => {
+            let (ate, moved, turned) =
+                (ate.error.rmse, rpe.translation.rmse, rpe.rotation.rmse.to_degrees());
+            let rpe = format!("RPE over 1 s {moved:.4} m and {turned:.3} degrees (rmse)");
+            result(format!("against the ground truth: ATE {ate:.4} m, {rpe}"));
+        }
         Some(Err(why)) => say(format!("note: not compared with the ground truth: {why}")),
         None => {}
     }
-    let (frames, points) = (mapped.frames.len(), mapped.map.len());
-    let (posed, folder) = (frames - mapped.lost(), output.display());
-    result(format!(
-        "{posed} of {} with a pose; {}; wrote {folder}",
-        counted(frames, "frame"),
-        counted(points, "point")
-    ));
+    let (posed, folder) = (mapped.frames.len() - mapped.lost(), output.display());
+    let [frames, points] =
+        [counted(mapped.frames.len(), "frame"), counted(mapped.map.len(), "point")];
+    result(format!("{posed} of {frames} with a pose; {points}; wrote {folder}"));
 }
 
 fn stats(

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::io::open;
-use kinoise::metrics::{Metrics, ViewMetrics, metrics};
+use kinoise::metrics::{FrameMetrics, Metrics, ViewMetrics, metrics};
 use kinoise::report::metrics_page;
 use kinoise::units::counted;
 
@@ -61,15 +61,11 @@ fn report(found: &Metrics) {
     if found.by_distance.len() > 1 {
         result("\nviews that face the sensor within ten degrees (all, where none does)");
         for group in &found.by_distance {
-            let [low, high] = group.range_m;
+            let ([low, high], views) = (group.range_m, counted(group.views, "view"));
+            let [accuracy, rms, subpixel, temporal, fill] =
+                figures(&group.mean, group.temporal_noise);
             result(format!(
-                "{low:.1} to {high:.1} m, {}: Z-accuracy {} %, plane-fit RMS {:.2} mm, sub-pixel RMS {} px, temporal {} %, fill {:.1} %",
-                counted(group.views, "view"),
-                optional(group.mean.z_accuracy.map(|v| 1e2 * v), 2),
-                1e3 * group.mean.plane_fit_rms_m,
-                optional(group.mean.subpixel_rms_px, 3),
-                optional(group.temporal_noise.map(|v| 1e2 * v), 3),
-                1e2 * group.mean.fill_rate
+                "{low:.1} to {high:.1} m, {views}: Z-accuracy {accuracy} %, plane-fit RMS {rms} mm, sub-pixel RMS {subpixel} px, temporal {temporal} %, fill {fill} %"
             ));
         }
     }
@@ -80,17 +76,21 @@ fn report(found: &Metrics) {
 
 fn row(view: &ViewMetrics, width: usize) -> String {
     let ViewMetrics { view: name, mean, temporal_noise, sigma_m, .. } = view;
-    format!(
-        "{name:width$}  {:>10.3}  {:>8.1}  {:>12}  {:>16.2}  {:>16}  {:>10}  {:>6.1}  {:>16.2}",
-        mean.axis_distance_m,
-        mean.tilt_rad.to_degrees(),
+    let (z, tilt, sigma) = (mean.axis_distance_m, mean.tilt_rad.to_degrees(), 1e3 * sigma_m);
+    let [accuracy, rms, subpixel, temporal, fill] = figures(mean, *temporal_noise);
+    let errors = format!("{accuracy:>12}  {rms:>16}  {subpixel:>16}  {temporal:>10}  {fill:>6}");
+    format!("{name:width$}  {z:>10.3}  {tilt:>8.1}  {errors}  {sigma:>16.2}")
+}
+
+/// Z-accuracy in %, RMS in mm and in px, temporal noise and fill rate in %.
+fn figures(mean: &FrameMetrics, temporal: Option<f64>) -> [String; 5] {
+    [
         optional(mean.z_accuracy.map(|v| 1e2 * v), 2),
-        1e3 * mean.plane_fit_rms_m,
+        optional(Some(1e3 * mean.plane_fit_rms_m), 2),
         optional(mean.subpixel_rms_px, 3),
-        optional(temporal_noise.map(|v| 1e2 * v), 3),
-        1e2 * mean.fill_rate,
-        1e3 * sigma_m
-    )
+        optional(temporal.map(|v| 1e2 * v), 3),
+        optional(Some(1e2 * mean.fill_rate), 1),
+    ]
 }
 
 fn optional(value: Option<f64>, decimals: usize) -> String {
