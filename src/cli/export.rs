@@ -21,37 +21,30 @@ pub struct Arguments {
     output: PathBuf,
     /// Who is to read it
     #[arg(long, value_name = "FORMAT", value_parser = one_of(FORMATS))]
-    format: (ExportFormat, &'static str),
+    format: ExportFormat,
 }
 
-type Choice = (&'static str, &'static str, (ExportFormat, &'static str));
-
-const FORMATS: [Choice; 9] = [
-    choice(
-        "python",
-        "A file that needs numpy alone: sigma(), correct(), sample()",
-        ExportFormat::Python,
-    ),
-    choice("c", "A C99 header with the same", ExportFormat::C),
-    choice("npz", "Tables of sigma and of the correction for numpy.load", ExportFormat::Npz),
-    choice("opencv", "The same and the intrinsics for cv::FileStorage", ExportFormat::OpenCv),
-    choice("camera-info", "The intrinsics for ROS' camera_info_manager", ExportFormat::CameraInfo),
-    choice(
-        "elevation-mapping",
-        "Parameters of its structured-light sensor processor",
-        ExportFormat::ElevationMapping,
-    ),
-    choice("isaac", "A depth sensor of Isaac Sim, as a USD layer", ExportFormat::Isaac),
-    choice("clams", "The bias alone, for CLAMS", ExportFormat::Clams),
-    choice("open3d", "The bias alone, for Open3D's DepthNoiseSimulator", ExportFormat::Open3d),
-];
-
-const fn choice(name: &'static str, help: &'static str, format: ExportFormat) -> Choice {
-    (name, help, (format, name))
-}
+const FORMATS: [(&str, &str, ExportFormat); 9] = {
+    use ExportFormat::*;
+    [
+        ("python", "A file that needs numpy alone: sigma(), correct(), sample()", Python),
+        ("c", "A C99 header with the same", C),
+        ("npz", "Tables of sigma and of the correction for numpy.load", Npz),
+        ("opencv", "The same and the intrinsics for cv::FileStorage", OpenCv),
+        ("camera-info", "The intrinsics for ROS' camera_info_manager", CameraInfo),
+        (
+            "elevation-mapping",
+            "Parameters of its structured-light sensor processor",
+            ElevationMapping,
+        ),
+        ("isaac", "A depth sensor of Isaac Sim, as a USD layer", Isaac),
+        ("clams", "The bias alone, for CLAMS", Clams),
+        ("open3d", "The bias alone, for Open3D's DepthNoiseSimulator", Open3d),
+    ]
+};
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
-    let Arguments { model: file, output, format: (format, name) } = arguments;
+    let Arguments { model: file, output, format } = arguments;
     let model = NoiseModel::read(file)?;
     detail_model(&model, Some(file));
     refuse_taken(output, file, global.force)?;
@@ -61,7 +54,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     notes(&exported.notes);
     result(format!("wrote {}", output.display()));
     global.print_json(&serde_json::json!({
-        "format": name,
+        "format": FORMATS.iter().find(|(.., f)| f == format).map(|(name, ..)| name),
         "output": output,
         "bytes": exported.bytes.len(),
         "notes": exported.notes,

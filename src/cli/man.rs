@@ -2,16 +2,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap_mangen::Man;
-use kinoise::io::Leaves;
 
 use super::command;
 use super::common::Global;
 use super::console::result;
-use super::output::begin;
-
-/// A page for the program and one a command.
-const PAGES: Leaves =
-    Leaves::Results { names: &[&["kinoise.1", "kinoise-"]], marks: &["kinoise.1"] };
+use super::output::{PAGES, begin};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:

@@ -11,6 +11,13 @@ use kinoise::io::{Interrupted, Leaves, OutputFolder, discard_unfinished};
 use super::common::Global;
 use super::console::result;
 
+/// The files of results; the first of them no other command writes.
+macro_rules! results {
+    ($mark:literal $(, $name:literal)*) => {
+        Leaves::Results { names: &[&[$mark $(, $name)*]], marks: &[$mark] }
+    };
+}
+
 const CALIBRATED: &[&str] = &[
     "model.json",
     "measurements.csv",
@@ -25,38 +32,29 @@ const CALIBRATED: &[&str] = &[
 pub const CALIBRATION: Leaves =
     Leaves::Results { names: &[CALIBRATED], marks: &["measurements.csv", "sigma.svg"] };
 
-pub const DIAGNOSIS: Leaves = Leaves::Results {
-    names: &[&["diagnosis.json", "model.json", "report.html"]],
-    marks: &["diagnosis.json"],
-};
+pub const DIAGNOSIS: Leaves = results!("diagnosis.json", "model.json", "report.html");
 
-pub const MAP: Leaves = Leaves::Results {
-    names: &[&["trajectory.txt", "map.ply", "map.html", "frames.csv", "stats.json"]],
-    marks: &["trajectory.txt"],
-};
+pub const MAP: Leaves =
+    results!("trajectory.txt", "map.ply", "map.html", "frames.csv", "stats.json");
 
-pub const COMPARISON: Leaves = Leaves::Results {
-    names: &[&[
-        "tables.json",
-        "tables.txt",
-        "fig6_paths.svg",
-        "fig7_ate.svg",
-        "fig8_rpe.svg",
-        "report.html",
-    ]],
-    marks: &["tables.json"],
-};
+pub const COMPARISON: Leaves = results!(
+    "tables.json",
+    "tables.txt",
+    "fig6_paths.svg",
+    "fig7_ate.svg",
+    "fig8_rpe.svg",
+    "report.html"
+);
 
-pub const EVALUATION: Leaves = Leaves::Results {
-    names: &[&["evaluation.json", "ate.svg", "rpe.svg", "paths.svg", "report.html"]],
-    marks: &["evaluation.json"],
-};
+pub const EVALUATION: Leaves =
+    results!("evaluation.json", "ate.svg", "rpe.svg", "paths.svg", "report.html");
 
-pub const METRICS: Leaves =
-    Leaves::Results { names: &[&["metrics.json", "report.html"]], marks: &["metrics.json"] };
+pub const METRICS: Leaves = results!("metrics.json", "report.html");
 
-pub const SIGMA: Leaves =
-    Leaves::Results { names: &[&["sigma", "sigma.txt", "sigma.json"]], marks: &["sigma.txt"] };
+pub const SIGMA: Leaves = results!("sigma.txt", "sigma", "sigma.json");
+
+/// A page of the manual for the program and one a command.
+pub const PAGES: Leaves = results!("kinoise.1", "kinoise-");
 
 /// A calibration with the rest of the road in folders beside it.
 pub const DEMO: Leaves = Leaves::Results {
