@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use kinoise::calibrate::paper_model;
 use kinoise::diagnose::{
-    DiagnoseOptions, Diagnosed, Diagnosis, Field, Reference, Verdict, ViewPictures, diagnose,
+    DiagnoseOptions, Diagnosed, Diagnosis, Field, Verdict, ViewPictures, diagnose,
     diagnose_against, pictures,
 };
 use kinoise::effects::{Active, Instant};
 use kinoise::io::{Assumed, DESCRIPTION, OutputFolder, open};
-use kinoise::report::{DiagnosisPage, Step, diagnosis_page, story};
+use kinoise::report::{DiagnosisPage, Step, diagnosis_page, story, subject};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
@@ -129,8 +129,7 @@ pub fn examine(
     let json = serde_json::to_value(diagnosis)?;
     out.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
     done.model.write(&out.path().join("model.json"))?;
-    let held_against = if simulated.is_some() { "simulation" } else { "model" };
-    let title = format!("What the {held_against} of {} leaves out", recording.sensor.name);
+    let title = format!("What the {} of {} leaves out", subject(diagnosis), recording.sensor.name);
     working("drawing the page", |_| -> anyhow::Result<()> {
         let pictures = with_twins(&done, &recording.sensor, model, options.seed);
         let origin = &origin(&recording.root, options.seed.0);
@@ -178,19 +177,16 @@ fn weights(
 }
 
 fn summary(diagnosis: &Diagnosis) -> String {
-    let held_against = match diagnosis.reference {
-        Reference::Model => "the model",
-        Reference::SimulatedRecording => "the simulation",
-    };
+    let it = subject(diagnosis);
     let mut text = match diagnosis.verdict {
-        Verdict::Match => format!("match: nothing was found that {held_against} leaves out\n"),
+        Verdict::Match => format!("match: nothing was found that the {it} leaves out\n"),
         Verdict::Inconclusive => {
             "inconclusive: nothing was found, and not everything could be tested\n".to_string()
         }
         Verdict::Mismatch if diagnosis.findings.iter().any(|f| f.contradicted.is_some()) => {
-            format!("mismatch: {held_against} does not fit the recording\n")
+            format!("mismatch: the {it} does not fit the recording\n")
         }
-        Verdict::Mismatch => format!("mismatch: {held_against} leaves out\n"),
+        Verdict::Mismatch => format!("mismatch: the {it} leaves out\n"),
     };
     for sentence in story(diagnosis) {
         text += &format!("  {}\n", one_line(&sentence));

@@ -11,7 +11,7 @@ mod table;
 
 use maud::{Markup, html};
 pub use next::Step;
-pub use sentences::called;
+pub use sentences::{called, subject};
 pub use story::story;
 
 use super::axis::Axis;

@@ -25,7 +25,7 @@ pub use axis::Axis;
 pub use calibration_page::{CalibrationPage, calibration_page};
 pub use chart::Chart;
 pub use comparison::{comparison_charts, comparison_page};
-pub use diagnosis_page::{DiagnosisPage, Step, called, diagnosis_page, story};
+pub use diagnosis_page::{DiagnosisPage, Step, called, diagnosis_page, story, subject};
 pub use document::Origin;
 pub use map_page::{MapPage, map_page};
 pub use metrics_page::metrics_page;

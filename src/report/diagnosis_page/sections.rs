@@ -7,7 +7,7 @@ use super::sentences::{
 };
 use super::story::{gained, smooth_residual};
 use super::{parameters, sentences};
-use crate::diagnose::{CannotTell, Diagnosis, MapRow, Reference, Verdict, ViewLine};
+use crate::diagnose::{CannotTell, Diagnosis, MapRow, Verdict, ViewLine};
 use crate::report::document::{
     self, Column, answer, fold, list, prose, row, section, table, table_of,
 };
@@ -21,20 +21,15 @@ const MAX_OPEN: usize = 6;
 const PX_DECIMALS: usize = 3;
 
 pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
-    let (class, mark) = match diagnosis.verdict {
-        Verdict::Match => ("good", "Match"),
-        Verdict::Mismatch => ("bad", "Mismatch"),
-        Verdict::Inconclusive => ("unsure", "Not settled"),
-    };
-    let subject = match diagnosis.reference {
-        Reference::Model => "The model",
-        Reference::SimulatedRecording => "The simulation",
-    };
-    let sentence = match diagnosis.verdict {
-        Verdict::Match => format!("{subject} reproduces this recording."),
-        Verdict::Mismatch => format!("{subject} does not reproduce this recording."),
+    let it = sentences::subject(diagnosis);
+    let (class, mark, sentence) = match diagnosis.verdict {
+        Verdict::Match => ("good", "Match", format!("The {it} reproduces this recording.")),
+        Verdict::Mismatch => {
+            ("bad", "Mismatch", format!("The {it} does not reproduce this recording."))
+        }
         Verdict::Inconclusive => {
-            format!("Whether {} reproduces this recording is not settled.", subject.to_lowercase())
+            let sentence = format!("Whether the {it} reproduces this recording is not settled.");
+            ("unsure", "Not settled", sentence)
         }
     };
     let unsettled = diagnosis.verdict == Verdict::Inconclusive;

@@ -23,6 +23,14 @@ pub(super) fn description(id: &'static str) -> &'static str {
     effects::find(id).map_or(id, |effect| effect.card().summary)
 }
 
+/// What the recording was held against.
+pub fn subject(diagnosis: &Diagnosis) -> &'static str {
+    match diagnosis.reference {
+        Reference::Model => "model",
+        Reference::SimulatedRecording => "simulation",
+    }
+}
+
 /// The answer in a sentence or two.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
     let effects = missing(&diagnosis.findings);
@@ -33,13 +41,13 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
         diagnosis.findings.iter().filter_map(|f| f.contradicted.map(against)).collect();
     let recalibrate = diagnosis.findings.iter().any(|f| f.status == Status::Recalibrate);
     match (diagnosis.verdict, effects.is_empty()) {
-        (Verdict::Match, _) => format!(
-            "The model explains this recording: nothing differs from {} by more than chance.",
-            match diagnosis.reference {
+        (Verdict::Match, _) => {
+            let reference = match diagnosis.reference {
                 Reference::Model => "the calibrated model",
                 Reference::SimulatedRecording => "the simulated recording",
-            }
-        ),
+            };
+            format!("The model explains this recording: nothing differs from {reference} by more than chance.")
+        }
         (Verdict::Inconclusive, true) => {
             "This recording does not settle whether the model is right.".into()
         }
@@ -55,20 +63,16 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
         (Verdict::Mismatch, true) => {
             "Model and recording differ, and these views cannot show why.".into()
         }
-        (Verdict::Mismatch, false) => format!(
-            "{} leaves {} out{} {names}{}.",
-            match diagnosis.reference {
-                Reference::Model => "The model",
-                Reference::SimulatedRecording => "The simulation",
-            },
-            count(effects.len(), "effect"),
-            if effects.len() > MAX_NAMES { ", above all" } else { ":" },
-            match (recalibrate, &contradicted[..]) {
+        (Verdict::Mismatch, false) => {
+            let above_all = if effects.len() > MAX_NAMES { ", above all" } else { ":" };
+            let more = match (recalibrate, &contradicted[..]) {
                 (_, [_, ..]) => format!("; and it has {}", join(&contradicted, "and")),
                 (true, []) => "; its own parameters are off as well".into(),
                 (false, []) => String::new(),
-            }
-        ),
+            };
+            let (subject, effects) = (subject(diagnosis), count(effects.len(), "effect"));
+            format!("The {subject} leaves {effects} out{above_all} {names}{more}.")
+        }
     }
 }
 

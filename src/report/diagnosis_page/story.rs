@@ -15,13 +15,8 @@ const MAX_SENTENCES: usize = 3;
 /// same tests find against the extended model: six at most, after the verdict's.
 pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
     if diagnosis.verdict != Verdict::Mismatch {
-        return diagnosis
-            .remarks
-            .first()
-            .filter(|_| unsettled(diagnosis))
-            .cloned()
-            .into_iter()
-            .collect();
+        let unsettled = diagnosis.verdict == Verdict::Inconclusive;
+        return diagnosis.remarks.iter().take(usize::from(unsettled)).cloned().collect();
     }
     let found = diagnosis.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
     let (main, minor): (Vec<&Finding>, Vec<&Finding>) = found.partition(|f| !f.minor);
@@ -31,10 +26,6 @@ pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
     sentences.extend(gained(diagnosis));
     sentences.extend(left(diagnosis));
     sentences
-}
-
-fn unsettled(diagnosis: &Diagnosis) -> bool {
-    diagnosis.verdict == Verdict::Inconclusive
 }
 
 /// A finding: what, how large, how much of all, with which parameters, and what to doubt of it.
@@ -67,21 +58,14 @@ fn of(f: &Finding) -> String {
         }
     };
     let parameter = |(name, value): (&String, &serde_json::Value)| brief(f.effect, name, value);
-    let parameters: Vec<String> = f.parameters.iter().filter_map(parameter).collect();
-    let parameters = match parameters[..] {
-        [] => String::new(),
-        _ => format!(" ({})", parameters.join(", ")),
-    };
-    let halves = match f.replicated {
-        Some(false) => "; the two halves of the views do not agree on it",
-        _ => "",
-    };
+    let known = f.parameters.iter().filter_map(parameter).collect::<Vec<_>>().join(", ");
+    let parameters = if known.is_empty() { known } else { format!(" ({known})") };
+    let differ = "; the two halves of the views do not agree on it";
+    let halves = if f.replicated == Some(false) { differ } else { "" };
     let next = f.next_view.as_ref().map_or_else(String::new, settled_by);
-    let name = capital(&called(f));
-    let share = match f.is_law() {
-        true => "by the reference distances".to_string(),
-        false => format!("{} % of the mismatch", fixed(100.0 * f.share, 0)),
-    };
+    let (name, share) = (capital(&called(f)), fixed(100.0 * f.share, 0));
+    let law = f.is_law().then(|| "by the reference distances".to_string());
+    let share = law.unwrap_or_else(|| format!("{share} % of the mismatch"));
     let sizes: Vec<String> = size.into_iter().chain([share]).collect();
     format!("{name}{rest}{which}: {}{parameters}{halves}{next}.", sizes.join(", "))
 }
@@ -91,39 +75,34 @@ fn settled_by(view: &NextView) -> String {
         tilt if tilt == "0" => "facing the sensor".to_string(),
         tilt => format!("tilted by {tilt}°, {} side away", far_side(view.azimuth_rad)),
     };
-    let helps = if view.is_likely_to_settle() {
-        format!("would settle it with a chance of {} %", fixed(100.0 * view.chance, 0))
-    } else {
-        "would help most, but is not likely to settle it".to_string()
+    let helps = match view.is_likely_to_settle() {
+        true => format!("would settle it with a chance of {} %", fixed(100.0 * view.chance, 0)),
+        false => "would help most, but is not likely to settle it".to_string(),
     };
     format!("; a view at {} m {pose} {helps}", fixed(view.z_m, 2))
 }
 
 /// Findings without a sentence of their own.
 fn rest(more: &[&Finding], minor: &[&Finding]) -> Option<String> {
-    let percent = |all: &[&Finding]| 100.0 * all.iter().map(|f| f.share).sum::<f64>();
+    let share = |all: &[&Finding]| all.iter().map(|f| f.share).sum::<f64>();
     let names = |all: &[&Finding]| {
-        let mut names: Vec<String> =
-            all.iter().filter(|f| f.effect.is_some()).map(|f| called(f)).collect();
-        let unnamed = all.len() - names.len();
-        match unnamed {
-            0 => {}
-            1 => names.push("one without a name".into()),
-            n => names.push(format!("{n} without a name")),
-        }
-        join(&names, "and")
+        let named = all.iter().filter(|f| f.effect.is_some()).map(|f| called(f));
+        let unnamed = match all.iter().filter(|f| f.effect.is_none()).count() {
+            0 => None,
+            1 => Some("one without a name".into()),
+            n => Some(format!("{n} without a name")),
+        };
+        join(&named.chain(unnamed).collect::<Vec<_>>(), "and")
     };
-    let mut parts = Vec::new();
-    if !more.is_empty() {
+    let more = (!more.is_empty()).then(|| {
         let called = join(&more.iter().map(|f| called(f)).collect::<Vec<_>>(), "and");
         let together = if more.len() > 1 { " together" } else { "" };
-        parts.push(format!("{called}, {} % of it{together}", fixed(percent(more), 0)));
-    }
-    if !minor.is_empty() {
-        let share = minor.iter().map(|f| f.share).sum();
-        let percent = small_percent(share);
-        parts.push(format!("small remains ({}), {percent} of it together", names(minor)));
-    }
+        format!("{called}, {} % of it{together}", fixed(100.0 * share(more), 0))
+    });
+    let minor = (!minor.is_empty()).then(|| {
+        format!("small remains ({}), {} of it together", names(minor), small_percent(share(minor)))
+    });
+    let parts: Vec<String> = more.into_iter().chain(minor).collect();
     (!parts.is_empty()).then(|| capital(&parts.join("; ")) + ".")
 }
 
@@ -155,10 +134,9 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
         gained.insert(0, format!("the smooth residual goes from {before} to {after}"));
     }
     let correction = [h.correction_rms_before_px, h.correction_rms_after_px].map(|v| fixed(v, 3));
-    let [before, after] = &correction;
-    let alone = match before == after {
-        true => String::new(),
-        false => {
+    let alone = match &correction {
+        [before, after] if before == after => String::new(),
+        [before, after] => {
             format!("; `kinoise correct` alone takes every pixel from {before} to {after} px rms")
         }
     };
