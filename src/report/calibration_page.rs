@@ -84,10 +84,7 @@ pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
             "σ against tilt",
             &figure(&figure2(measured, sigma, page.overlays, &names), FIGURE2)?,
         ))
-        (section(
-            "What the fit leaves",
-            &figure(&fit_residuals(measured, sigma, &names), RESIDUALS)?,
-        ))
+        (section("What the fit leaves", &figure(&fit_residuals(measured, sigma, &names), RESIDUALS)?))
         (model(page))
         @if let Some(uncertainty) = &calibration.model.uncertainty {
             (uncertainty::section_of(uncertainty))
@@ -245,25 +242,23 @@ fn model(page: &CalibrationPage<'_>) -> Markup {
         (">distances left out", &|h| html! { (h.folds) }),
         ("~from", &|h| html! { (h.form.card().reference) }),
     ];
-    section(
-        "Model",
-        &html! {
-            p {
-                "Form " b { (fit.form.id()) } ": " (fit.form.card().formula) ". "
-                span.units { (fit.form.card().reference) }
-            }
-            (result(page))
-            (table_of(&parameters, &fit.parameters))
-            (heading(3, "How the forms predict distances they have not seen"))
-            @if calibration.comparison.is_empty() {
-                p { "Not known: too few distances to leave one out." }
-            } @else {
-                (table_of(&forms, &calibration.comparison))
-                p.note { "Each group of distances is left out of the fit in turn and then predicted; a greater \
-                    log score is better. The form used is in bold." }
-            }
-        },
-    )
+    let content = html! {
+        p {
+            "Form " b { (fit.form.id()) } ": " (fit.form.card().formula) ". "
+            span.units { (fit.form.card().reference) }
+        }
+        (result(page))
+        (table_of(&parameters, &fit.parameters))
+        (heading(3, "How the forms predict distances they have not seen"))
+        @if calibration.comparison.is_empty() {
+            p { "Not known: too few distances to leave one out." }
+        } @else {
+            (table_of(&forms, &calibration.comparison))
+            p.note { "Each group of distances is left out of the fit in turn and then predicted; a greater \
+                log score is better. The form used is in bold." }
+        }
+    };
+    section("Model", &content)
 }
 
 /// What it takes to make the model again, beside the page's origin.

@@ -20,6 +20,7 @@ use super::numbers::degrees;
 use super::residuals::{residual_image, scale};
 use crate::diagnose::{Diagnosis, Finding, Reference, Status, ViewPictures};
 use crate::error::Result;
+use crate::units::counted;
 
 /// What the page is about.
 #[derive(Debug, Clone, Copy)]
@@ -90,19 +91,17 @@ fn pictures(page: &DiagnosisPage<'_>) -> Result<Markup> {
     }
     let twins = page.pictures.iter().any(|p| p.twin.is_some());
     let title = if twins { "Recorded, remaining, simulated" } else { "Recorded and remaining" };
-    Ok(section(
-        title,
-        &html! {
-            p {
-                "Residuals of single views: mean depth minus the plane, along the optical axis, in mm. Blue is nearer, \
-                 red farther, white no error, grey not the target. Where everything is explained, the second \
-                 picture shows noise alone"
-                @if twins { ", and the third, simulated with the extended model, looks like the first" }
-                "."
-            }
-            @for figure in figures { (figure) }
-        },
-    ))
+    let content = html! {
+        p {
+            "Residuals of single views: mean depth minus the plane, along the optical axis, in mm. Blue is nearer, \
+             red farther, white no error, grey not the target. Where everything is explained, the second \
+             picture shows noise alone"
+            @if twins { ", and the third, simulated with the extended model, looks like the first" }
+            "."
+        }
+        @for figure in figures { (figure) }
+    };
+    Ok(section(title, &content))
 }
 
 fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup> {
@@ -111,14 +110,8 @@ fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup>
         Reference::Model => "",
         Reference::SimulatedRecording => ", recorded minus simulated",
     };
-    let plural = if view.frames == 1 { "" } else { "s" };
-    let of_view = format!(
-        "View {}{beyond}: {:.2} m, tilt {}°, mean of {} frame{plural}",
-        view.name,
-        view.z_m,
-        degrees(view.theta_rad),
-        view.frames
-    );
+    let (z, tilt, frames) = (view.z_m, degrees(view.theta_rad), counted(view.frames, "frame"));
+    let of_view = format!("View {}{beyond}: {z:.2} m, tilt {tilt}°, mean of {frames}", view.name);
     let range = scale(&picture.before);
     let [before, after] = [&picture.before, &picture.after].map(|p| rms(p.iter().copied()));
     let twin = picture.twin.as_deref().map_or_else(String::new, |twin| {

@@ -39,19 +39,12 @@ fn over_distance(groups: &[AtDistance]) -> Chart {
         let point = |g: &AtDistance| Some([g.mean.axis_distance_m, MM * value(g)?]);
         groups.iter().filter_map(point).collect::<Vec<_>>()
     };
-    let lines = vec![
-        (
-            "plane-fit RMS".to_string(),
-            of(|g| Some(g.mean.plane_fit_rms_m)),
-            Stroke::new(line(0), 2),
-        ),
-        (
-            "temporal noise".into(),
-            of(|g| Some(g.temporal_noise? * g.mean.axis_distance_m)),
-            Stroke::new(line(1), 2),
-        ),
-    ];
-    let lines = lines.into_iter().filter(|(_, points, _)| points.len() > 1).collect();
+    let fit = of(|g| Some(g.mean.plane_fit_rms_m));
+    let temporal = of(|g| Some(g.temporal_noise? * g.mean.axis_distance_m));
+    let lines = [("plane-fit RMS", fit, 0), ("temporal noise", temporal, 1)].into_iter();
+    let lines = lines.filter(|(_, points, _)| points.len() > 1);
+    let lines = lines.map(|(name, points, i)| (name.into(), points, Stroke::new(line(i), 2)));
+    let lines = lines.collect();
     chart("Noise over distance", ["distance on the optical axis (m)", "mm"], lines, false)
 }
 

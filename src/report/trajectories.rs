@@ -121,14 +121,11 @@ impl Against<'_> {
         let columns = ["", ">rmse", ">mean", ">median", ">std", ">min", ">max", ">pairs"];
         let mm = |s: &Spread| format!("{} mm", fixed(MM * s.rmse, 1));
         let remark = |s: &Spread| format!("rmse of {}", counted(s.pairs, "pair"));
+        let (turn, over) = (format!("{}°", fixed(degrees.rmse, 2)), format!("rmse over {over}"));
         let tiled = [
             ("absolute trajectory error", mm(&e.ate.error), remark(&e.ate.error)),
-            ("relative error, translation", mm(&e.rpe.translation), format!("rmse over {over}")),
-            (
-                "relative error, rotation",
-                format!("{}°", fixed(degrees.rmse, 2)),
-                format!("rmse over {over}"),
-            ),
+            ("relative error, translation", mm(&e.rpe.translation), over.clone()),
+            ("relative error, rotation", turn, over),
         ];
         let [paths, over_time @ ..] = self.charts().map(|(_, chart)| chart);
         let paths = figure(&paths, "both paths, seen along the axis of least motion")?;

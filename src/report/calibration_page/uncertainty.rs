@@ -11,36 +11,34 @@ use crate::units::counted;
 pub(super) fn section_of(uncertainty: &Uncertainty) -> Markup {
     let errors: Vec<(&str, &Budget)> = of_views(uncertainty, |v| v.distance_error.as_ref());
     let sigmas: Vec<(&str, &Budget)> = of_views(uncertainty, |v| Some(&v.sigma));
-    section(
-        "Uncertainty",
-        &html! {
-            p { "This is " (uncertainty.statement) "." }
-            (heading(3, "Error of indication"))
-            p.note { "Depth of the fitted plane on the optical axis minus the reference distance. It is not taken off \
-                anything by this page." }
-            @if errors.is_empty() {
-                p { (prose("Not known: it takes `reference_distance_m` and `reference_uncertainty_m` in view.json.")) }
-            } @else {
-                (summary(&errors))
-                (worst(&errors))
-            }
-            (heading(3, "Standard deviation σ of the noise"))
-            (summary(&sigmas))
-            (worst(&sigmas))
-            (heading(3, "Conditions"))
-            (conditions(&uncertainty.conditions))
-            @if !uncertainty.not_stated.is_empty() {
-                p { "Without rows for what the recording does not state, in all views or some:" }
-                (list(uncertainty.not_stated.iter().map(|key| html! { code { (key) } })))
-            }
-            p.note {
-                "u: combined standard uncertainty of independent inputs (GUM 5.1.2). ν: effective degrees of freedom \
-                 (Welch and Satterthwaite, GUM G.4.1), ∞ where all that counts is Type B. U = k u with k = 2; in \
-                 brackets the probability of that interval by Student's t. What one tape or one board is off by is common \
-                 to its views and does not average out over them."
-            }
-        },
-    )
+    let content = html! {
+        p { "This is " (uncertainty.statement) "." }
+        (heading(3, "Error of indication"))
+        p.note { "Depth of the fitted plane on the optical axis minus the reference distance. It is not taken off \
+            anything by this page." }
+        @if errors.is_empty() {
+            p { (prose("Not known: it takes `reference_distance_m` and `reference_uncertainty_m` in view.json.")) }
+        } @else {
+            (summary(&errors))
+            (worst(&errors))
+        }
+        (heading(3, "Standard deviation σ of the noise"))
+        (summary(&sigmas))
+        (worst(&sigmas))
+        (heading(3, "Conditions"))
+        (conditions(&uncertainty.conditions))
+        @if !uncertainty.not_stated.is_empty() {
+            p { "Without rows for what the recording does not state, in all views or some:" }
+            (list(uncertainty.not_stated.iter().map(|key| html! { code { (key) } })))
+        }
+        p.note {
+            "u: combined standard uncertainty of independent inputs (GUM 5.1.2). ν: effective degrees of freedom \
+             (Welch and Satterthwaite, GUM G.4.1), ∞ where all that counts is Type B. U = k u with k = 2; in \
+             brackets the probability of that interval by Student's t. What one tape or one board is off by is common \
+             to its views and does not average out over them."
+        }
+    };
+    section("Uncertainty", &content)
 }
 
 fn of_views<'a>(

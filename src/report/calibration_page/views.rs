@@ -37,21 +37,19 @@ pub(super) fn section_of(views: &[ViewMeasurement]) -> Markup {
             html! { (v.exclusions.invalid) " / " (v.exclusions.off_plane) " / " (v.exclusions.edge) }
         }),
     ];
-    section(
-        "Views",
-        &html! {
-            (table_of(&columns, views))
-            p.note {
-                "z: mean depth of the target. Axis: depth of its plane on the optical axis. Off reference: that \
-                 minus the distance measured by other means, “(!)” where they differ by more than "
-                (ReferenceDistance::describe_tolerance()) ". σ: of one frame over the whole target, along the optical \
-                 axis; in px of disparity where the sensor has one. Temporal: of one pixel over the frames. Normal: across the plane. Paper: mean depth, tilt and \
-                 spread of the RANSAC inliers of the first frame. n: samples (pixels times frames). n effective: \
-                 independent samples they are worth. Corr.: length over which neighbouring pixels err together; “+” \
-                 where it had not died out. Pixels left out: without depth / off the plane / at the target's edge."
-            }
-        },
-    )
+    let content = html! {
+        (table_of(&columns, views))
+        p.note {
+            "z: mean depth of the target. Axis: depth of its plane on the optical axis. Off reference: that \
+             minus the distance measured by other means, “(!)” where they differ by more than "
+            (ReferenceDistance::describe_tolerance()) ". σ: of one frame over the whole target, along the optical \
+             axis; in px of disparity where the sensor has one. Temporal: of one pixel over the frames. Normal: across the plane. Paper: mean depth, tilt and \
+             spread of the RANSAC inliers of the first frame. n: samples (pixels times frames). n effective: \
+             independent samples they are worth. Corr.: length over which neighbouring pixels err together; “+” \
+             where it had not died out. Pixels left out: without depth / off the plane / at the target's edge."
+        }
+    };
+    section("Views", &content)
 }
 
 /// Signed, in mm, and marked where it is too much.
@@ -68,39 +66,30 @@ fn correlation(view: &ViewMeasurement) -> String {
 
 pub(super) fn gallery(views: &[ViewMeasurement]) -> Result<Markup> {
     let pictures = views.iter().map(picture).collect::<Result<Vec<Markup>>>()?;
-    Ok(section(
-        "Residuals",
-        &html! {
-            p {
-                "Mean depth minus the plane, along the optical axis, in mm. Blue is nearer than the plane, red \
-                 farther, grey is not the target. Each picture has its own scale; a click enlarges it."
-            }
-            div.gallery { @for picture in pictures { (picture) } }
-        },
-    ))
+    let content = html! {
+        p {
+            "Mean depth minus the plane, along the optical axis, in mm. Blue is nearer than the plane, red \
+             farther, grey is not the target. Each picture has its own scale; a click enlarges it."
+        }
+        div.gallery { @for picture in pictures { (picture) } }
+    };
+    Ok(section("Residuals", &content))
 }
 
 fn picture(view: &ViewMeasurement) -> Result<Markup> {
-    let picture = &view.picture;
+    let (picture, name) = (&view.picture, &view.name);
     let scale = scale(&picture.millimetres);
     let size = [picture.width, picture.height];
-    let alt = format!(
-        "residual of view {}, {} m, tilt {}°: ±{} mm from blue to red",
-        view.name,
-        fixed(view.z_m, 2),
-        degrees(view.theta_rad),
-        Axis::label(scale)
-    );
+    let (z, tilt, end) = (fixed(view.z_m, 2), degrees(view.theta_rad), Axis::label(scale));
+    let alt = format!("residual of view {name}, {z} m, tilt {tilt}°: ±{end} mm from blue to red");
     let image = residual_image(size, &picture.millimetres, scale, &alt)?;
-    let end = Axis::label(scale);
     Ok(html! {
         figure {
             (image)
             div.scale { span { "−" (end) } span { "0" } span { "+" (end) " mm" } }
             figcaption {
-                b { (view.name) } br;
-                (fixed(view.z_m, 2)) " m, " (degrees(view.theta_rad)) "°, σ "
-                (millimetres(view.whole.spread.spatial_m)) " mm"
+                b { (name) } br;
+                (z) " m, " (tilt) "°, σ " (millimetres(view.whole.spread.spatial_m)) " mm"
             }
         }
     })

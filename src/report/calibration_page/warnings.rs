@@ -20,23 +20,21 @@ pub(super) fn section(warnings: &[String], excluded: &[Excluded]) -> Markup {
         .map(String::as_str)
         .filter(|warning| !of_an_excluded(warning))
         .partition(|warning| warning.starts_with(ABOUT_A_VIEW));
-    document::section(
-        "Warnings",
-        &html! {
-            @if warnings.is_empty() { p { "None." } }
-            (list(general.iter().map(|w| prose(w))))
-            @if !excluded.is_empty() {
-                @let title = format!("{} left out", counted(excluded.len(), "view"));
-                @let items = list(excluded.iter().map(|e| html! { b { (e.view) } ": " (prose(&e.reason)) }));
-                (fold(&title, excluded.len() <= MAX_OPEN, &items))
-            }
-            @for group in grouped(&views) {
-                @let items = list(group.iter().map(|w| prose(w)));
-                @let title = format!("{} like: {}", counted(group.len(), "remark"), group[0]);
-                @if group.len() <= MAX_OPEN { (items) } @else { (fold(&title, false, &items)) }
-            }
-        },
-    )
+    let content = html! {
+        @if warnings.is_empty() { p { "None." } }
+        (list(general.iter().map(|w| prose(w))))
+        @if !excluded.is_empty() {
+            @let title = format!("{} left out", counted(excluded.len(), "view"));
+            @let items = list(excluded.iter().map(|e| html! { b { (e.view) } ": " (prose(&e.reason)) }));
+            (fold(&title, excluded.len() <= MAX_OPEN, &items))
+        }
+        @for group in grouped(&views) {
+            @let items = list(group.iter().map(|w| prose(w)));
+            @let title = format!("{} like: {}", counted(group.len(), "remark"), group[0]);
+            @if group.len() <= MAX_OPEN { (items) } @else { (fold(&title, false, &items)) }
+        }
+    };
+    document::section("Warnings", &content)
 }
 
 /// Remarks that differ in the view and in numbers only, together; in order of appearance.

@@ -86,23 +86,16 @@ fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
         }));
     }
     if finding.status != Status::NotIdentifiable {
-        facts.push((
-            "How sure".into(),
-            html! {
-                (capital(&chance(p)))
-                @if let Some(p) = p { " (" (p_value(p)) ")" }
-            },
-        ));
+        let sure = html! { (capital(&chance(p))) @if let Some(p) = p { " (" (p_value(p)) ")" } };
+        facts.push(("How sure".into(), sure));
         facts.push(("Halves of the views".into(), html! { (halves(finding.replicated)) }));
         if finding.share.is_finite() {
             let percent = fixed((100.0 * finding.share).clamp(0.0, 100.0), 0);
-            facts.push((
-                "Share".into(),
-                html! {
-                    span.bar { span style={ "width:" (percent) "%" } {} }
-                    " " b { (percent) " %" } " of all that was explained"
-                },
-            ));
+            let share = html! {
+                span.bar { span style={ "width:" (percent) "%" } {} }
+                " " b { (percent) " %" } " of all that was explained"
+            };
+            facts.push(("Share".into(), share));
         }
     }
     // `amplitude_px = 0.3 ± 0.1 px`, and what that is.

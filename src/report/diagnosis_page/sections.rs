@@ -34,17 +34,13 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
     };
     let unsettled = diagnosis.verdict == Verdict::Inconclusive;
     let why = diagnosis.remarks.first().filter(|_| unsettled);
-    answer(
-        class,
-        mark,
-        &sentence,
-        &html! {
-            @if let Some(why) = why { p { (prose(why)) } }
-            @if let Some(gained) = gained(diagnosis) { p { (prose(&gained)) } }
-            p { (prose(&sentences::verdict(diagnosis))) }
-            (tiles(diagnosis))
-        },
-    )
+    let more = html! {
+        @if let Some(why) = why { p { (prose(why)) } }
+        @if let Some(gained) = gained(diagnosis) { p { (prose(&gained)) } }
+        p { (prose(&sentences::verdict(diagnosis))) }
+        (tiles(diagnosis))
+    };
+    answer(class, mark, &sentence, &more)
 }
 
 /// The numbers that go with the verdict.
@@ -70,11 +66,8 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
         tiles.push(("smooth residual, views kept out", change, "rms, before and after".into()));
     }
     if !diagnosis.findings.is_empty() {
-        tiles.push((
-            "still unexplained",
-            capital(&remaining),
-            "when the tests are run again".into(),
-        ));
+        let again = "when the tests are run again".into();
+        tiles.push(("still unexplained", capital(&remaining), again));
     }
     document::tiles(tiles)
 }
@@ -87,35 +80,30 @@ pub(super) fn held_out(diagnosis: &Diagnosis) -> Markup {
     let px = |v| format!("{} px", fixed(v, PX_DECIMALS));
     let every = "every pixel of every frame, noise included, rms";
     let score = [held.log_score_before, held.log_score_after].map(|v| fixed(v, 1));
+    let corrected = [held.correction_rms_before_px, held.correction_rms_after_px].map(px);
     let rows = [
         row!["smooth residual, rms", mm(held.rms_mm_before), mm(held.rms_mm_after)],
         row![every, px(held.rms_px_before), px(held.rms_px_after)],
-        row![
-            "the same after kinoise correct alone",
-            px(held.correction_rms_before_px),
-            px(held.correction_rms_after_px)
-        ],
+        row!["the same after kinoise correct alone", corrected[0], corrected[1]],
         row!["log score, nats a view", score[0], score[1]],
     ];
-    section(
-        "What was gained",
-        &html! {
-            p {
-                "Tested on " (count(held.views.len(), "view")) " that took no part in the search: "
-                span.units { (held.views.join(", ")) } "."
-            }
-            (table(&["", ">before", ">after"], rows))
-            @if not_scored {
-                p { "What was found has no part in this score." }
-            } @else { p {
-                @if held.gain_interval[0] > 0.0 { "The extended model predicts such a view better by " }
-                @else { "No gain beyond chance: the extended model differs by " }
-                b { (gain) " nats a view" }
-                " (95 % interval " (low) " to " (high) ", by resampling views). "
-                span.units { "A nat more makes what was recorded e ≈ 2.7 times as probable." }
-            } }
-        },
-    )
+    let content = html! {
+        p {
+            "Tested on " (count(held.views.len(), "view")) " that took no part in the search: "
+            span.units { (held.views.join(", ")) } "."
+        }
+        (table(&["", ">before", ">after"], rows))
+        @if not_scored {
+            p { "What was found has no part in this score." }
+        } @else { p {
+            @if held.gain_interval[0] > 0.0 { "The extended model predicts such a view better by " }
+            @else { "No gain beyond chance: the extended model differs by " }
+            b { (gain) " nats a view" }
+            " (95 % interval " (low) " to " (high) ", by resampling views). "
+            span.units { "A nat more makes what was recorded e ≈ 2.7 times as probable." }
+        } }
+    };
+    section("What was gained", &content)
 }
 
 /// The same tests against the extended model.
@@ -124,23 +112,21 @@ pub(super) fn remaining(diagnosis: &Diagnosis) -> Markup {
     if diagnosis.findings.is_empty() && after.remaining.is_empty() {
         return html! {};
     }
-    section(
-        "What remains",
-        &html! {
-            p {
-                "The same tests against the extended model: "
-                @match after.verdict {
-                    Verdict::Match => "match. Nothing differs beyond chance.",
-                    Verdict::Mismatch => "still a mismatch.",
-                    Verdict::Inconclusive => "not settled.",
-                }
+    let content = html! {
+        p {
+            "The same tests against the extended model: "
+            @match after.verdict {
+                Verdict::Match => "match. Nothing differs beyond chance.",
+                Verdict::Mismatch => "still a mismatch.",
+                Verdict::Inconclusive => "not settled.",
             }
-            (list(after.remaining.iter().map(|r| html! {
-                b { (capital(statistic(r.statistic))) } " " (along(r.axis))
-                @if !r.words.is_empty() { ": " (prose(&r.words)) } @if let Some(p) = r.p_adjusted { " (" (p_value(p)) ")" }
-            })))
-        },
-    )
+        }
+        (list(after.remaining.iter().map(|r| html! {
+            b { (capital(statistic(r.statistic))) } " " (along(r.axis))
+            @if !r.words.is_empty() { ": " (prose(&r.words)) } @if let Some(p) = r.p_adjusted { " (" (p_value(p)) ")" }
+        })))
+    };
+    section("What remains", &content)
 }
 
 /// What the absence of a finding is worth.

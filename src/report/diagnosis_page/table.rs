@@ -18,20 +18,18 @@ pub(super) fn findings(main: &[&Finding], minor: &[&Finding]) -> Markup {
     if rows.is_empty() && minor.is_empty() {
         return html! {};
     }
-    section(
-        "What was found",
-        &html! {
-            @if !rows.is_empty() {
-                (table(&COLUMNS, rows))
-                p.note {
-                    "Size: root mean square over the recording. Times σ: beside the noise of a single reading. Name: \
-                     probability that the first name is right, beside the other names that would explain it. Chance: p of \
-                     a difference this large if the model were right, corrected for the number of places searched."
-                }
+    let content = html! {
+        @if !rows.is_empty() {
+            (table(&COLUMNS, rows))
+            p.note {
+                "Size: root mean square over the recording. Times σ: beside the noise of a single reading. Name: \
+                 probability that the first name is right, beside the other names that would explain it. Chance: p of \
+                 a difference this large if the model were right, corrected for the number of places searched."
             }
-            (small(minor))
-        },
-    )
+        }
+        (small(minor))
+    };
+    section("What was found", &content)
 }
 
 /// Where a finding's own part of the page is.
@@ -102,16 +100,9 @@ fn small(minor: &[&Finding]) -> Markup {
         let p = html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } };
         let (size, share) = (mm(f.size.mm), format!("{} %", fixed(100.0 * f.share, 2)));
         let (what, off) = (capital(&called(f)), capital(statistic(f.statistic)));
-        row![
-            what,
-            size,
-            significant(f.size.sigma, 2),
-            share,
-            p,
-            off,
-            axis(f.axis),
-            halves(f.replicated)
-        ]
+        let (sigmas, along, halves) =
+            (significant(f.size.sigma, 2), axis(f.axis), halves(f.replicated));
+        row![what, size, sigmas, share, p, off, along, halves]
     };
     html! { @if !minor.is_empty() {
         (fold(
