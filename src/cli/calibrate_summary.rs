@@ -19,14 +19,11 @@ pub fn formula(calibration: &Calibration) -> String {
     let [rows, views] = [counted(fit.rows, "sigma"), counted(fit.views, "view")];
     let r2 = fit.quality.r2;
     let (rmse_mm, share) = (1e3 * fit.quality.rmse_m, 1e2 * fit.quality.rmse_relative);
-    let _ = write!(
-        text,
-        "fitted to {rows} of {views}: rmse {rmse_mm:.2} mm ({share:.1} % of sigma), r2 {r2:.4}"
-    );
-    if let Some(h) = calibration.comparison.iter().find(|h| h.form == fit.form) {
-        let _ = write!(text, "; {:.1} % at distances left out", 1e2 * h.rmse_relative);
-    }
-    text
+    let rmse = format!("rmse {rmse_mm:.2} mm ({share:.1} % of sigma), r2 {r2:.4}");
+    let heldout = calibration.comparison.iter().find(|h| h.form == fit.form);
+    let heldout =
+        heldout.map(|h| format!("; {:.1} % at distances left out", 1e2 * h.rmse_relative));
+    text + &format!("fitted to {rows} of {views}: {rmse}{}", heldout.unwrap_or_default())
 }
 
 /// The surface beside the published ones, and the forms compared.

@@ -150,11 +150,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     };
     notes(&source.remarks()[noted..]);
     if source.dropped() > 0 {
-        say(format!(
-            "note: {} came too fast and {} lost",
-            counted(source.dropped(), "frame"),
-            verb(source.dropped(), "was", "were")
-        ));
+        let (frames, were) =
+            (counted(source.dropped(), "frame"), verb(source.dropped(), "was", "were"));
+        say(format!("note: {frames} came too fast and {were} lost"));
     }
     let kept = session.taken()?;
     global.print_json(&json!({

@@ -35,14 +35,12 @@ fn message(event: &Event) -> Option<String> {
         Event::Finished(view) => Some(format!("{view} taken")),
         Event::Abandoned { view, why } => Some(format!("{view} thrown away: {why}")),
         Event::Rejected(view) => Some(format!("{view} thrown away, to be taken again")),
-        Event::Drift(d) => Some(format!(
-            "the plane at {:.2} m drifts by {:+.2} ± {:.2} mm/min over {:.0} s: {}",
-            d.z_m,
-            1e3 * d.per_minute_m,
-            1e3 * d.std_error_m,
-            d.seconds,
-            if d.is_warming() { "the sensor is warming up" } else { "steady" }
-        )),
+        Event::Drift(d) => {
+            let state = if d.is_warming() { "the sensor is warming up" } else { "steady" };
+            let (z, by, error) = (d.z_m, 1e3 * d.per_minute_m, 1e3 * d.std_error_m);
+            let drifts = format!("drifts by {by:+.2} ± {error:.2} mm/min over {:.0} s", d.seconds);
+            Some(format!("the plane at {z:.2} m {drifts}: {state}"))
+        }
     }
 }
 

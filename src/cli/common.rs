@@ -68,12 +68,7 @@ impl Global {
 #[derive(Debug, Default, PartialEq, Args)]
 pub struct Input {
     /// fx,fy,cx,cy in px, for folders without recording.json
-    #[arg(
-        long,
-        value_name = "FX,FY,CX,CY",
-        value_parser = numbers::<4>(-MAX_PX, MAX_PX, "px"),
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "FX,FY,CX,CY", value_parser = numbers::<4>(-MAX_PX, MAX_PX, "px"), allow_hyphen_values = true)]
     intrinsics: Option<[f64; 4]>,
     /// Raw depth values per metre (1000 = mm, 5000 = TUM), for folders without recording.json
     #[arg(long, value_name = "N", conflicts_with = "raw_disparity", allow_hyphen_values = true, value_parser = between(UNITS_PER_METRE[0], UNITS_PER_METRE[1], "1/m"))]
@@ -169,21 +164,19 @@ impl Model {
         }
         let beyond = outside(sequence, &model).filter(|share| *share > MAX_OUTSIDE);
         let percent = |share: f64| format!("{:.0} % of the depths here lie outside", 1e2 * share);
-        let [near, far] = model.sigma.domain.z_m;
+        let ([near, far], beyond) = (model.sigma.domain.z_m, beyond.map(percent));
         match &self.file {
             Some(file) => {
                 say_differences(file, &model, &sequence.sensor);
-                if let Some(share) = beyond {
-                    let outside = percent(share);
+                if let Some(outside) = beyond {
                     say(format!(
                         "note: {outside} {near:.2} to {far:.2} m, where the model was measured; sigma is held at its edge"
                     ));
                 }
             }
             None => {
-                let held = beyond
-                    .map(|share| format!("; {}, where it is held at its edge", percent(share)));
-                let held = held.unwrap_or_default();
+                let held = |outside| format!("; {outside}, where it is held at its edge");
+                let held = beyond.map_or_else(String::new, held);
                 say(format!(
                     "no --model was given: points are weighed by the paper's Eq. 1, for a Kinect v1 at {near} to {far} m{held}"
                 ));
@@ -205,10 +198,9 @@ const MAX_OUTSIDE: f64 = 0.1;
 pub fn say_differences(file: &Path, model: &NoiseModel, sensor: &Sensor) {
     let differences = model.differences(sensor);
     if !differences.is_empty() {
+        let (file, differences) = (file.display(), differences.join("; "));
         say(format!(
-            "note: {} seems to be of another sensor: {}; its weights and corrections may do harm here: give this sensor's own model",
-            file.display(),
-            differences.join("; ")
+            "note: {file} seems to be of another sensor: {differences}; its weights and corrections may do harm here: give this sensor's own model"
         ));
     }
 }

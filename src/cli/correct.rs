@@ -88,10 +88,8 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     let Corrected { changed, measured, frames, clamped, ignored, .. } = corrected;
     notes(&corrected.remarks);
     if !ignored.is_empty() {
-        say(format!(
-            "note: left in, because they are noise or belong to the scene: {}",
-            each_once(ignored)
-        ));
+        let left = each_once(ignored);
+        say(format!("note: left in, because they are noise or belong to the scene: {left}"));
     }
     if *changed == 0 {
         say(format!("note: {} holds no bias that changes a depth here", arguments.model.display()));
@@ -110,16 +108,10 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
 
 /// Each name once, with how often it stands there.
 fn each_once(names: &[String]) -> String {
-    let mut counts: Vec<(&str, usize)> = Vec::new();
-    for name in names {
-        match counts.iter_mut().find(|(known, _)| known == name) {
-            Some((_, n)) => *n += 1,
-            None => counts.push((name, 1)),
-        }
-    }
-    let times = |(name, n): &(&str, usize)| match n {
-        1 => name.to_string(),
-        _ => format!("{name} ({n} times)"),
+    let first = names.iter().enumerate().filter(|(i, name)| !names[..*i].contains(name));
+    let times = |(_, name): (usize, &String)| match names.iter().filter(|n| *n == name).count() {
+        1 => name.clone(),
+        n => format!("{name} ({n} times)"),
     };
-    counts.iter().map(times).collect::<Vec<_>>().join(", ")
+    first.map(times).collect::<Vec<_>>().join(", ")
 }

@@ -9,8 +9,6 @@ use super::console::quoted;
 
 /// Results do not depend on these.
 const FLAGS: [&str; 5] = ["--json", "--force", "--exit-zero", "-q", "-v"];
-const WITH_VALUE: &str = "--threads";
-const OUTPUT: [&str; 2] = ["-o", "--output"];
 
 /// Of a page made from `recording` now (or at SOURCE_DATE_EPOCH).
 pub fn origin(recording: &Path, seed: u64) -> Origin {
@@ -25,18 +23,14 @@ fn command(typed: &[String]) -> String {
     let (mut words, mut typed) = (vec!["kinoise".to_string()], typed.iter());
     while let Some(word) = typed.next() {
         let (name, value) = word.split_once('=').map_or((&**word, None), |(n, v)| (n, Some(v)));
-        if FLAGS.contains(&name) {
-            continue;
-        }
-        if name == WITH_VALUE {
-            if value.is_none() {
-                typed.next();
+        let mut value = || value.or_else(|| typed.next().map(String::as_str)).unwrap_or_default();
+        match name {
+            _ if FLAGS.contains(&name) => {}
+            "--threads" => _ = value(),
+            "-o" | "--output" => {
+                words.extend(["-o".into(), quoted(&name_of(Path::new(value())))]);
             }
-        } else if OUTPUT.contains(&name) {
-            let folder = value.map_or_else(|| typed.next().cloned(), |v| Some(v.to_string()));
-            words.extend(["-o".into(), quoted(&name_of(Path::new(&folder.unwrap_or_default())))]);
-        } else {
-            words.push(quoted(word));
+            _ => words.push(quoted(word)),
         }
     }
     words.join(" ")
