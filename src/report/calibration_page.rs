@@ -59,9 +59,6 @@ const RESIDUALS: &str = "Measured σ minus the fit, in percent of the fit, with 
     from the number of independent samples. What bends here is not in the form.";
 
 /// The page as text.
-///
-/// # Errors
-/// When a picture cannot be drawn.
 pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
     let (calibration, names) = (page.calibration, page.names());
     let (measured, sigma) = (&calibration.table, &calibration.model.sigma);

@@ -13,9 +13,6 @@ use crate::error::Result;
 use crate::trajectory::Pose;
 
 /// The page: tables and figures, one self-contained file.
-///
-/// # Errors
-/// When plotters fails.
 pub fn comparison_page(comparison: &Comparison, origin: &Origin) -> Result<String> {
     let [paths, over_time @ ..] = comparison_charts(comparison).map(|(_, chart)| chart);
     let title = format!("Mapping {}, variant by variant", comparison.sequence);

@@ -36,9 +36,6 @@ pub struct DiagnosisPage<'a> {
 }
 
 /// The page as text: one self-contained file.
-///
-/// # Errors
-/// When a picture cannot be drawn.
 pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
     let diagnosis = page.diagnosis;
     let (main, minor) = by_size(&diagnosis.findings);

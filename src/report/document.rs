@@ -186,9 +186,6 @@ pub fn fold(title: &str, open: bool, content: &Markup) -> Markup {
 
 /// A chart with its caption (none where its title says it), wide and narrow: the style shows the one
 /// that fits.
-///
-/// # Errors
-/// When the chart cannot be drawn.
 pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
     let label = if chart.title.is_empty() { caption } else { &chart.title };
     let caption = (caption != label || chart.title.is_empty()).then_some(caption);

@@ -29,9 +29,6 @@ pub struct MapPage<'a> {
 }
 
 /// The page as text.
-///
-/// # Errors
-/// When a chart cannot be drawn.
 pub fn map_page(page: &MapPage<'_>) -> Result<String> {
     let stride = page.points.len().div_ceil(MAX_POINTS).max(1);
     let finite = |p: &&MapPoint| p.at.iter().all(|v| v.is_finite());

@@ -12,9 +12,6 @@ use crate::metrics::{AtDistance, Metrics, ViewMetrics};
 use crate::report::chart::Stroke;
 
 /// The page as text.
-///
-/// # Errors
-/// When a chart cannot be drawn.
 pub fn metrics_page(title: &str, metrics: &Metrics, origin: &Origin) -> Result<String> {
     let body = html! {
         h1 { (title) }

@@ -2,7 +2,8 @@
 //!
 //! A figure is a [`Chart`] first (what stands where, with which label), drawn second, by one set
 //! of functions for SVG and PNG alike. A page puts charts, tables and sentences into the skeleton
-//! of [`document`]; `numbers` decides how a number is written.
+//! of [`document`]; `numbers` decides how a number is written. The one error of a page, a figure or a
+//! chart is that a picture cannot be drawn.
 
 mod axis;
 mod calibration_page;

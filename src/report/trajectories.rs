@@ -102,9 +102,6 @@ impl Against<'_> {
     }
 
     /// The figures as tiles and as a table, and the errors over time.
-    ///
-    /// # Errors
-    /// When a chart cannot be drawn.
     pub(super) fn parts(&self) -> Result<Markup> {
         let e = self.evaluation;
         let row = |name: String, s: Spread| -> Vec<Markup> {
@@ -148,9 +145,6 @@ impl Against<'_> {
 }
 
 /// The page of an evaluation.
-///
-/// # Errors
-/// When a chart cannot be drawn.
 pub fn evaluation_page(against: &Against<'_>, origin: &Origin) -> Result<String> {
     let title = "A trajectory against the ground truth";
     let body = html! {

@@ -26,9 +26,6 @@ const TIP: i32 = 8;
 
 impl Chart {
     /// As SVG text, with its tips.
-    ///
-    /// # Errors
-    /// When plotters fails.
     pub fn svg(&self) -> Result<String> {
         let mut text = String::new();
         self.draw_on(SVGBackend::with_string(&mut text, self.size), 1, 0.0)?;
@@ -41,9 +38,6 @@ impl Chart {
     }
 
     /// As the bytes of a PNG.
-    ///
-    /// # Errors
-    /// When plotters or the PNG encoder fails.
     pub fn png(&self) -> Result<Vec<u8>> {
         let scale = PNG_SCALE * OVERSAMPLING;
         let (width, height) = (self.size.0 * scale, self.size.1 * scale);
