@@ -239,8 +239,8 @@ fn name_of(ending: &Ending) -> &'static str {
 /// The closing line and the exit code.
 fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::Result<u8> {
     let wanted = guide.wanted();
-    let views_are = if kept == 1 { "view is" } else { "views are" };
-    let stands = format!("{kept} {views_are} kept in {}", root.display());
+    let are = verb(kept, "is", "are");
+    let stands = format!("{} {are} kept in {}", counted(kept, "view"), root.display());
     let missing = still_wanted(guide).len();
     let still = if wanted.any { String::new() } else { format!(", {missing} still wanted") };
     let on = format!("{stands}{still}; give the same command again to resume");

@@ -134,11 +134,8 @@ fn filmed(
     let out = own(folder)?;
     working("filming", |step| shoot.write_quickly(out.path(), step))?;
     out.finish()?;
-    say(format!(
-        "filmed {} of {FRAMES_A_VIEW} frames with it: {}\n",
-        counted(shoot.views.len(), "view"),
-        folder.display()
-    ));
+    let (views, folder) = (counted(shoot.views.len(), "view"), folder.display());
+    say(format!("filmed {views} of {FRAMES_A_VIEW} frames with it: {folder}\n"));
     Ok(())
 }
 

@@ -92,33 +92,23 @@ impl After<'_> {
             let words = [&like[..], &model_again(given), &effect, self.input].concat();
             commands.push(format!("  kinoise {}", shell(&words)));
         }
-        let heading = match commands.len() {
-            0 => None,
-            1 => Some("to simulate the finding:".to_string()),
-            _ => Some("to simulate each finding:".to_string()),
-        };
+        let the = if commands.len() == 1 { "the" } else { "each" };
+        let heading = (!commands.is_empty()).then(|| format!("to simulate {the} finding:"));
         heading.into_iter().chain(commands).chain(self.without_formula(&others)).collect()
     }
 
     /// Findings that no `--effect` stands for.
     fn without_formula(&self, findings: &[&Finding]) -> Option<String> {
-        let seen = findings
-            .iter()
-            .filter(|f| f.status != Status::NotIdentifiable && f.contradicted.is_none());
-        let (shaped, bare): (Vec<&Finding>, Vec<&Finding>) =
-            seen.partition(|f| !f.terms.is_empty());
+        let seen = |f: &&&Finding| f.status != Status::NotIdentifiable && f.contradicted.is_none();
+        let names = |shaped: bool| {
+            let alike = findings.iter().filter(seen).filter(|f| f.terms.is_empty() != shaped);
+            alike.map(|f| called(f)).collect::<Vec<_>>().join(", ")
+        };
         let model = self.folder.join("model.json");
         let brought = format!("measured, and simulated with -m {}", shell(&[model.into()]));
-        let parts = [(shaped, brought), (bare, "of a strength that is not known".to_string())];
-        let parts: Vec<String> = parts
-            .iter()
-            .filter(|(findings, _)| !findings.is_empty())
-            .map(|(findings, what)| format!("{} ({what})", listed(findings)))
-            .collect();
+        let parts = [(names(true), &*brought), (names(false), "of a strength that is not known")];
+        let parts = parts.iter().filter(|(names, _)| !names.is_empty());
+        let parts: Vec<String> = parts.map(|(names, what)| format!("{names} ({what})")).collect();
         (!parts.is_empty()).then(|| format!("  no --effect stands for {}", parts.join(" and ")))
     }
-}
-
-fn listed(findings: &[&Finding]) -> String {
-    findings.iter().map(|f| called(f)).collect::<Vec<_>>().join(", ")
 }

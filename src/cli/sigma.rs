@@ -50,17 +50,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         ));
     }
     if written.clamped > 0 {
-        say(format!(
-            "note: {} pixels have a sigma beyond 0.65 m, the most an image holds",
-            written.clamped
-        ));
+        let most = "beyond 0.65 m, the most an image holds";
+        say(format!("note: {} pixels have a sigma {most}", written.clamped));
     }
-    result(format!(
-        "wrote {} images of sigma, {:.2} mm on average, 10 um a unit, into {}",
-        written.frames,
-        1e3 * written.mean_m,
-        arguments.output.display()
-    ));
+    let (frames, mm, folder) = (written.frames, 1e3 * written.mean_m, arguments.output.display());
+    let unit = "10 um a unit";
+    result(format!("wrote {frames} images of sigma, {mm:.2} mm on average, {unit}, into {folder}"));
     global.print_json(&json!({
         "frames": written.frames,
         "pixels": written.measured,

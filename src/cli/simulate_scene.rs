@@ -103,17 +103,15 @@ impl SceneryArguments {
 /// Effects that have nothing to act on in this scene.
 pub fn note_idle(effects: &[Active], scenery: &SceneryArguments, like: bool) {
     for active in effects {
-        let missing = match active.effect.card().id {
-            "occlusion-shadow" | "edge-mixing" if scenery.wall.is_none() => {
-                ("something behind the target", "--wall")
-            }
+        let (id, bare) = (active.effect.card().id, scenery.wall.is_none());
+        let (missing, option) = match id {
+            "occlusion-shadow" | "edge-mixing" if bare => ("something behind the target", "--wall"),
             "intensity-dependent-noise" if !scenery.patches => {
                 ("a target of several greys", "--patches")
             }
             _ => continue,
         };
-        let (missing, option) = missing;
         let how = if like { "views taken --like others have none" } else { option };
-        say(format!("note: {} needs {missing} to show much ({how})", active.effect.card().id));
+        say(format!("note: {id} needs {missing} to show much ({how})"));
     }
 }
