@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Plane;
 use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
-use super::ransac::{Estimator, RansacOptions, UniformSampler, ransac};
+use super::ransac::{RansacOptions, ransac};
 use crate::camera::{Camera, Rays};
 use crate::rng::Stream;
 use crate::stats::median_in_place;
@@ -101,34 +101,6 @@ impl InverseDepthImage<'_> {
     }
 }
 
-/// Samples of inverse depth for RANSAC: hypotheses are affine through three pixels.
-struct AffineSamples {
-    rows: Vec<(Vector3<f64>, f64)>,
-}
-
-impl Estimator for AffineSamples {
-    type Model = Vector3<f64>;
-    const MINIMAL: usize = 3;
-
-    fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    fn hypothesis(&self, sample: &[usize]) -> Option<Vector3<f64>> {
-        let [a, b, c] = [sample[0], sample[1], sample[2]].map(|i| self.rows[i]);
-        let m = Matrix3::from_rows(&[a.0.transpose(), b.0.transpose(), c.0.transpose()]);
-        // Twice the area of the triangle in the normalised image: thin ones extrapolate badly.
-        if m.determinant().abs() < 1e-6 {
-            return None;
-        }
-        m.lu().solve(&Vector3::new(a.1, b.1, c.1)).filter(|q| q.iter().all(|v| v.is_finite()))
-    }
-
-    fn distance(&self, q: &Vector3<f64>, i: usize) -> f64 {
-        (self.rows[i].1 - q.dot(&self.rows[i].0)).abs()
-    }
-}
-
 /// Does the pixel's ray meet the plane before the camera?
 pub(super) fn in_front(image: &InverseDepthImage<'_>, plane: &Plane, i: usize) -> bool {
     plane.inverse_depth_at(image.rays, i) > 0.0
@@ -143,7 +115,7 @@ pub(super) fn on_plane(image: &InverseDepthImage<'_>, fit: &AffineFit, i: usize)
 const SEED_HYPOTHESES: usize = 300;
 const SEED_SAMPLES: usize = 900;
 
-/// RANSAC on a sample of `pixels`, then the robust fit on all of them.
+/// RANSAC on a sample of `pixels`, affine through three, then the robust fit on all of them.
 pub(super) fn seed_plane(
     image: &InverseDepthImage<'_>,
     pixels: &[u32],
@@ -165,9 +137,18 @@ pub(super) fn seed_plane(
         iterations: SEED_HYPOTHESES,
         confidence: SEED_CONFIDENCE,
     };
-    let samples = AffineSamples { rows };
-    let jury: Vec<usize> = (0..samples.len()).collect();
-    let q = ransac(&samples, &options, &mut UniformSampler { rng }, &jury)?;
+    let hypothesis = |three: [usize; 3]| {
+        let [a, b, c] = three.map(|i| rows[i]);
+        let m = Matrix3::from_rows(&[a.0.transpose(), b.0.transpose(), c.0.transpose()]);
+        // Twice the area of the triangle in the normalised image: thin ones extrapolate badly.
+        if m.determinant().abs() < 1e-6 {
+            return None;
+        }
+        m.lu().solve(&Vector3::new(a.1, b.1, c.1)).filter(|q| q.iter().all(|v| v.is_finite()))
+    };
+    let distance = |q: &Vector3<f64>, i: usize| (rows[i].1 - q.dot(&rows[i].0)).abs();
+    let jury: Vec<usize> = (0..rows.len()).collect();
+    let q = ransac(rows.len(), &options, rng, &jury, hypothesis, distance)?;
     fit_affine_robust(image.w, image.rays, pixels, &Plane::new(q), floor, Effort::Sample)
 }
 

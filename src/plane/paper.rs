@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rand::seq::index::sample;
 
 use super::Plane;
-use super::ransac::{Estimator, RansacOptions, UniformSampler, ransac};
+use super::ransac::{RansacOptions, ransac};
 use crate::rng::Stream;
 
 /// Points in the optical frame, m, by coordinate.
@@ -29,29 +29,6 @@ impl Points {
 
 /// n . X = rho, n of unit length.
 type NormalForm = (Vector3<f64>, f64);
-
-impl Estimator for Points {
-    type Model = NormalForm;
-    const MINIMAL: usize = 3;
-
-    fn len(&self) -> usize {
-        self.x.len()
-    }
-
-    fn hypothesis(&self, sample: &[usize]) -> Option<NormalForm> {
-        let [a, b, c] = [self.at(sample[0]), self.at(sample[1]), self.at(sample[2])];
-        let normal = (b - a).cross(&(c - a));
-        let length = normal.norm();
-        (length > 1e-9).then(|| {
-            let n = normal / length;
-            (n, n.dot(&a))
-        })
-    }
-
-    fn distance(&self, (n, rho): &NormalForm, i: usize) -> f64 {
-        (n.dot(&self.at(i)) - rho).abs()
-    }
-}
 
 /// The paper's plane and what it measures from the inliers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,10 +57,17 @@ pub fn ransac_plane(
     options: &RansacOptions,
     rng: &mut Stream,
 ) -> Option<RansacPlane> {
-    let n = points.len();
+    let n = points.x.len();
     let jury: Vec<usize> =
         if n <= JURY { (0..n).collect() } else { sample(rng, n, JURY).into_vec() };
-    let mut model = ransac(points, options, &mut UniformSampler { rng }, &jury)?;
+    let through = |three: [usize; 3]| {
+        let [a, b, c] = three.map(|i| points.at(i));
+        let normal = (b - a).cross(&(c - a));
+        let (length, n) = (normal.norm(), normal / normal.norm());
+        (length > 1e-9).then(|| (n, n.dot(&a)))
+    };
+    let distance = |(n, rho): &NormalForm, i: usize| (n.dot(&points.at(i)) - rho).abs();
+    let mut model = ransac(n, options, rng, &jury, through, distance)?;
     for _ in 0..REFITS {
         model = Moments::of_inliers(points, &model, options.threshold_m).total_least_squares()?;
     }

@@ -1,47 +1,8 @@
-//! RANSAC (Fischler and Bolles 1981).
-//!
-//! The split follows the roles that vary on their own: an [`Estimator`] knows the geometry, a sampler
-//! says which points to try. The loop, which counts the data within a threshold, is written once.
+//! RANSAC (Fischler and Bolles 1981) for what three data determine.
 
 use rand::Rng;
 
 use crate::rng::Stream;
-
-/// Geometry: a model from a minimal sample, and how far a datum is from it.
-pub trait Estimator {
-    type Model: Copy;
-    /// Data needed for one hypothesis.
-    const MINIMAL: usize;
-    fn len(&self) -> usize;
-    /// `None` when the sample is degenerate.
-    fn hypothesis(&self, sample: &[usize]) -> Option<Self::Model>;
-    /// Unsigned distance of datum `i` from the model.
-    fn distance(&self, model: &Self::Model, i: usize) -> f64;
-}
-
-/// Data of the largest minimal sample there is: three points of a plane.
-const MAX_MINIMAL: usize = 3;
-
-/// Choice: uniform, without repetition.
-pub struct UniformSampler<'r> {
-    pub rng: &'r mut Stream,
-}
-
-impl UniformSampler<'_> {
-    /// `count` different indices below `n`, in the first slots.
-    fn draw(&mut self, count: usize, n: usize) -> [usize; MAX_MINIMAL] {
-        let mut drawn = [0; MAX_MINIMAL];
-        for slot in 0..count {
-            loop {
-                drawn[slot] = self.rng.random_range(0..n);
-                if !drawn[..slot].contains(&drawn[slot]) {
-                    break;
-                }
-            }
-        }
-        drawn
-    }
-}
 
 /// When a search ends, and what lies on a plane.
 #[derive(Debug, Clone, Copy)]
@@ -52,39 +13,51 @@ pub struct RansacOptions {
     pub confidence: f64,
 }
 
-/// The best of up to `iterations` hypotheses by its inliers among the `jury`; stops early once a
-/// better one is less likely than `1 - confidence`.
-pub fn ransac<E: Estimator>(
-    data: &E,
+/// The best of up to `iterations` hypotheses, each through three of `n` data, by its inliers among the
+/// `jury`; stops early once a better one is less likely than `1 - confidence`. `hypothesis` is `None` of
+/// a degenerate sample, `distance` that of a datum from a model, without a sign.
+pub fn ransac<M: Copy>(
+    n: usize,
     options: &RansacOptions,
-    sampler: &mut UniformSampler<'_>,
+    rng: &mut Stream,
     jury: &[usize],
-) -> Option<E::Model> {
-    debug_assert!(E::MINIMAL <= MAX_MINIMAL);
-    if data.len() < E::MINIMAL || jury.is_empty() {
+    hypothesis: impl Fn([usize; 3]) -> Option<M>,
+    distance: impl Fn(&M, usize) -> f64,
+) -> Option<M> {
+    if n < 3 || jury.is_empty() {
         return None;
     }
-    let mut best: Option<(E::Model, usize)> = None;
+    let mut best: Option<(M, usize)> = None;
     let mut needed = options.iterations;
     let mut tried = 0;
     while tried < needed.min(options.iterations) {
         tried += 1;
-        let drawn = sampler.draw(E::MINIMAL, data.len());
-        let Some(model) = data.hypothesis(&drawn[..E::MINIMAL]) else { continue };
-        let inlier = |i: &&usize| data.distance(&model, **i) < options.threshold_m;
+        let Some(model) = hypothesis(three_below(n, rng)) else { continue };
+        let inlier = |i: &&usize| distance(&model, **i) < options.threshold_m;
         let inliers = jury.iter().filter(inlier).count();
         if best.is_none_or(|(_, most)| inliers > most) {
             best = Some((model, inliers));
-            let share = inliers as f64 / jury.len() as f64;
-            needed = hypotheses_needed(share, E::MINIMAL, options.confidence);
+            needed = hypotheses_needed(inliers as f64 / jury.len() as f64, options.confidence);
         }
     }
     best.map(|(model, _)| model)
 }
 
-/// log(1 - p) / log(1 - w^m), Fischler and Bolles (1981).
-fn hypotheses_needed(inlier_share: f64, minimal: usize, confidence: f64) -> usize {
-    let good = inlier_share.clamp(0.0, 1.0).powi(minimal as i32);
+/// Different indices below `n`, uniform.
+fn three_below(n: usize, rng: &mut Stream) -> [usize; 3] {
+    let mut drawn = [0; 3];
+    for slot in 0..3 {
+        drawn[slot] = rng.random_range(0..n);
+        while drawn[..slot].contains(&drawn[slot]) {
+            drawn[slot] = rng.random_range(0..n);
+        }
+    }
+    drawn
+}
+
+/// log(1 - p) / log(1 - w^3), Fischler and Bolles (1981).
+fn hypotheses_needed(inlier_share: f64, confidence: f64) -> usize {
+    let good = inlier_share.clamp(0.0, 1.0).powi(3);
     if good >= 1.0 {
         return 1;
     }
@@ -101,7 +74,7 @@ mod tests {
 
     #[test]
     fn the_number_of_hypotheses_is_the_textbook_one() {
-        assert_eq!(hypotheses_needed(0.5, 3, 0.99), 35);
-        assert_eq!(hypotheses_needed(1.0, 3, 0.99), 1);
+        assert_eq!(hypotheses_needed(0.5, 0.99), 35);
+        assert_eq!(hypotheses_needed(1.0, 0.99), 1);
     }
 }
