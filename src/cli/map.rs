@@ -127,7 +127,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let thinning = &arguments.thinning;
     sequence.thin(thinning.stride, thinning.frames);
     let options = arguments.tuning.options(global.seed());
-    options.check()?;
     notes(&sequence.remarks);
     let model = arguments.model.read_for(&sequence)?;
     let title = format!("Map of {}", name_of(&arguments.sequence));

@@ -241,48 +241,6 @@ impl Options {
             ..Options::paper(Weights::Both, Init::Motion)
         }
     }
-
-    /// An error when a number is out of its range.
-    pub fn check(&self) -> Result<()> {
-        let Options { voxel_m, block_px, max_correspondence_m: reach, .. } = *self;
-        let Options { max_iterations, max_observations, readout_s, .. } = *self;
-        let checks = [
-            (
-                (VOXEL_M[0] as f32..=VOXEL_M[1] as f32).contains(&voxel_m),
-                format!("--voxel {voxel_m}"),
-                "give 0.002 to 1 m",
-            ),
-            (
-                (1..=MAX_BLOCK_PX).contains(&block_px),
-                format!("--block {block_px}"),
-                "give 1 to 32 px",
-            ),
-            (
-                (GATE_M[0] as f32..=GATE_M[1] as f32).contains(&reach),
-                format!("--gate {reach}"),
-                "give 0.001 to 2 m",
-            ),
-            (
-                (1..=MAX_ITERATIONS).contains(&max_iterations),
-                format!("--iterations {max_iterations}"),
-                "give 1 to 1000",
-            ),
-            (
-                (1.0..=MAX_OBSERVATIONS).contains(&max_observations),
-                format!("--memory {max_observations}"),
-                "give 1 to 108000",
-            ),
-            (
-                (0.0..=MAX_READOUT_S).contains(&readout_s),
-                format!("--readout {readout_s}"),
-                "give 0 to 1 s",
-            ),
-        ];
-        match checks.into_iter().find(|(good, ..)| !good) {
-            Some((_, what, remedy)) => Err(Error::Argument { what, remedy }),
-            None => Ok(()),
-        }
-    }
 }
 
 /// Alignments of real films settle within 30 (the paper's limit); one that has not by now never does.
