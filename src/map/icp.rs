@@ -135,7 +135,7 @@ pub fn align<T: Target>(
         near = shift < NEAR && turn < NEAR;
         few.enough |= near;
     }
-    finish(pose, last, Ending { termination, iterations, misfit, inlier_ratio })
+    Alignment { termination, iterations, misfit, inlier_ratio, ..Alignment::of(pose, last) }
 }
 
 /// The points of the first rounds: far from the goal a few tell the way as well as all. The paper's
@@ -206,38 +206,24 @@ pub fn renormalised(pose: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(pose.translation, rotation)
 }
 
-/// What the rounds ended with; as in [`Alignment`].
-struct Ending {
-    termination: Termination,
-    iterations: usize,
-    misfit: f64,
-    inlier_ratio: f64,
-}
-
-fn finish(
-    pose: Isometry3<f64>,
-    last: Option<(NormalEquations, Solution)>,
-    ending: Ending,
-) -> Alignment {
-    let (correspondences, rms_m, solution) = match last {
-        Some((equations, solution)) => {
-            let n = equations.correspondences;
-            (n, Some((equations.squares_m2 / n as f64).sqrt()), Some(solution))
+impl Alignment {
+    /// By the last round's sums, if it had any; the rest is the caller's.
+    fn of(pose: Isometry3<f64>, last: Option<(NormalEquations, Solution)>) -> Self {
+        let (equations, solution) = last.unzip();
+        let correspondences = equations.as_ref().map_or(0, |e| e.correspondences);
+        let unknown = Matrix6::from_diagonal_element(f64::INFINITY);
+        Alignment {
+            target_from_source: pose,
+            covariance: solution.as_ref().map_or(unknown, |s| s.covariance),
+            iterations: 0,
+            termination: Termination::MaxIterations,
+            inlier_ratio: 0.0,
+            correspondences,
+            misfit: f64::INFINITY,
+            rms_m: equations.map(|e| (e.squares_m2 / correspondences as f64).sqrt()),
+            min_information: solution.as_ref().map_or(0.0, |s| s.min_information),
+            degenerate_directions: solution.map(|s| s.degenerate_directions).unwrap_or_default(),
         }
-        None => (0, None, None),
-    };
-    let unknown = Matrix6::from_diagonal_element(f64::INFINITY);
-    Alignment {
-        target_from_source: pose,
-        covariance: solution.as_ref().map_or(unknown, |s| s.covariance),
-        iterations: ending.iterations,
-        termination: ending.termination,
-        inlier_ratio: ending.inlier_ratio,
-        correspondences,
-        misfit: ending.misfit,
-        rms_m,
-        min_information: solution.as_ref().map_or(0.0, |s| s.min_information),
-        degenerate_directions: solution.map(|s| s.degenerate_directions).unwrap_or_default(),
     }
 }
 
