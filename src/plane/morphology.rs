@@ -1,6 +1,7 @@
 //! Sets of lattice nodes: reached, grown, shrunk.
 
 use super::grow::Lattice;
+use crate::stats::SummedArea;
 
 /// Gaps up to this many nodes are crossed: speckle holes, not the gap between two objects.
 const BRIDGE: usize = 2;
@@ -36,23 +37,9 @@ impl Lattice {
 
     /// Nodes at most `steps` columns and `steps` rows from a set one.
     pub fn within(&self, mask: &[bool], steps: usize) -> Vec<bool> {
-        let spread = |mask: &[bool], length: usize, at: &dyn Fn(usize, usize) -> usize| {
-            let mut wide = vec![false; mask.len()];
-            for line in 0..mask.len() / length {
-                let (mut forth, mut back) = (usize::MAX, usize::MAX);
-                for k in 0..length {
-                    let (a, b) = (at(line, k), at(line, length - 1 - k));
-                    forth = if mask[a] { 0 } else { forth.saturating_add(1) };
-                    back = if mask[b] { 0 } else { back.saturating_add(1) };
-                    wide[a] |= forth <= steps;
-                    wide[b] |= back <= steps;
-                }
-            }
-            wide
-        };
-        let columns = self.columns;
-        let along_rows = spread(mask, columns, &|row, k| row * columns + k);
-        spread(&along_rows, self.rows, &|column, k| k * columns + column)
+        let sums = SummedArea::of(self.columns, self.rows, |n| mask[n].then_some([1.0]));
+        let around = |n: usize| sums.around(n % self.columns, n / self.columns, steps);
+        (0..mask.len()).map(|n| around(n) > [0.0]).collect()
     }
 
     /// Every node with a set node within one step.
