@@ -21,30 +21,32 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
     let first = list.frames.first().ok_or_else(|| {
         Error::recording(&path, "no depth frame in it", "list at least one existing depth image")
     })?;
-    let mut remarks = list.remarks;
-    let description = root.join(DESCRIPTION);
-    let mut described_by = vec![path.clone()];
-    let sensor = if is_there(&description)? {
+    let (remarks, described_by) = (list.remarks, vec![path.clone()]);
+    let sensor = || assumed.sequence_sensor(&path, size_of(first)?);
+    let film = Footage { remarks, described_by, ..Footage::default() };
+    let (film, sensor) = film.described(root, sensor)?;
+    Ok((Footage { frames: list.frames, ..film }, sensor))
+}
+
+impl Footage {
+    /// With the sensor by the recording.json in `root`, else by what is `assumed`, and remarks on either.
+    fn described(
+        mut self,
+        root: &Path,
+        assumed: impl FnOnce() -> Result<(Sensor, Option<String>)>,
+    ) -> Result<(Self, Sensor)> {
+        let description = root.join(DESCRIPTION);
+        if !is_there(&description)? {
+            let (sensor, remark) = assumed()?;
+            self.remarks.extend(remark);
+            return Ok((self, sensor));
+        }
         let mut unknown = UnknownKeys::default();
         let sensor = read_sensor(&description, &mut unknown)?;
-        remarks.extend(unknown.remarks());
-        described_by.push(description);
-        sensor
-    } else {
-        let (sensor, remark) = assumed.sequence_sensor(&path, size_of(first)?)?;
-        remarks.extend(remark);
-        sensor
-    };
-    Ok((
-        Footage {
-            frames: list.frames,
-            film: Film::Video,
-            remarks,
-            described_by,
-            ..Footage::default()
-        },
-        sensor,
-    ))
+        self.remarks.extend(unknown.remarks());
+        self.described_by.push(description);
+        Ok((self, sensor))
+    }
 }
 
 /// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.
@@ -70,7 +72,7 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
     files.retain(|p| is_called_image(p));
     let odd = files.extract_if(.., |p| !p.is_file()).collect::<Vec<_>>();
     let odd = odd.iter().map(|p| format!("{} is not a regular file; left out", p.display()));
-    let mut remarks: Vec<String> = odd.collect();
+    let remarks: Vec<String> = odd.collect();
     // A calibration leaves pictures, which are no depth.
     if let Some(error) = results_in(root) {
         return Err(error);
@@ -84,23 +86,12 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
         .map(|(i, path)| FrameRef::file(i as f64 * NOMINAL_INTERVAL_S, path));
     let frames: Vec<FrameRef> = stamped.collect();
     let description = root.join(DESCRIPTION);
-    let mut described_by = Vec::new();
-    let sensor = if is_there(&description)? {
+    if is_there(&description)? {
         assumed.refuse_beside(&description)?;
-        let mut unknown = UnknownKeys::default();
-        let sensor = read_sensor(&description, &mut unknown)?;
-        remarks.extend(unknown.remarks());
-        described_by.push(description);
-        sensor
-    } else {
-        let (sensor, remark) = assumed.images_sensor(root, &frames)?;
-        remarks.extend(remark);
-        sensor
-    };
-    Ok((
-        Footage { frames, film: Film::Captures, remarks, described_by, ..Footage::default() },
-        sensor,
-    ))
+    }
+    let film = Footage { film: Film::Captures, remarks, ..Footage::default() };
+    let (film, sensor) = film.described(root, || assumed.images_sensor(root, &frames))?;
+    Ok((Footage { frames, ..film }, sensor))
 }
 
 /// What a folder without a recording holds instead, as far as it is known.
@@ -195,14 +186,8 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
     })?;
     let (sensor, remark) = assumed.dump_sensor(size_of(first)?)?;
     remarks.extend(remark);
-    let footage = Footage {
-        frames,
-        film: Film::Video,
-        remarks,
-        described_by: vec![index],
-        ..Footage::default()
-    };
-    Ok((footage, sensor))
+    let described_by = vec![index];
+    Ok((Footage { frames, remarks, described_by, ..Footage::default() }, sensor))
 }
 
 /// Host time in seconds: the first number of `d-<time>-<stamp>.pgm`.
