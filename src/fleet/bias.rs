@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::curve::Curve;
-use super::own::{Member, Standing, sort_out, standings};
+use super::own::{Standing, sort_out};
 use super::unit::UnitModel;
 use crate::camera::Camera;
 use crate::model::{Effect, NoiseModel};
@@ -255,9 +255,8 @@ pub(super) fn shared(
     Comparable { units, curves: all, distances }: &Comparable,
     statistics: usize,
 ) -> Option<SharedBias> {
-    let curves: Vec<&Curve> = all.iter().collect();
-    let members = sort_out(&curves, statistics)?;
-    let mean = Curve::mean(&curves)?;
+    let (standings, departures) = sort_out(units.iter(), all, statistics)?;
+    let mean = Curve::mean(&all.iter().collect::<Vec<_>>())?;
     let count = all.len() as f64;
     let plain_mean = all.iter().map(|c| &c.values).sum::<DVector<f64>>() / count;
     let root = |square: f64| square.max(0.0).sqrt();
@@ -269,9 +268,9 @@ pub(super) fn shared(
         };
         let about: f64 = all.iter().map(about).sum();
         let errors: f64 = all.iter().map(|c| mean_squares(c, d)[1]).sum();
-        let of_unit = |(unit, (curve, member)): (&String, (&Curve, &Member))| {
+        let of_unit = |(unit, (curve, departure)): (&String, (&Curve, &Curve))| {
             let [own, own_error] = mean_squares(curve, d);
-            let [off, off_error] = mean_squares(&member.departure, d);
+            let [off, off_error] = mean_squares(departure, d);
             BiasOfUnit {
                 unit: unit.clone(),
                 rms_m: own.sqrt(),
@@ -283,11 +282,11 @@ pub(super) fn shared(
             z_m,
             common_rms_m: root(square - error),
             scatter_rms_m: root(about / (count - 1.0) - errors / count),
-            units: units.iter().zip(all.iter().zip(&members)).map(of_unit).collect(),
+            units: units.iter().zip(all.iter().zip(&departures)).map(of_unit).collect(),
         }
     };
     let distances = distances.iter().enumerate().map(at).collect();
-    Some(SharedBias { standings: standings(units.iter(), &members), distances })
+    Some(SharedBias { standings, distances })
 }
 
 /// Mean square over the picture at the `d`-th distance: of the values, and of their errors.

@@ -7,17 +7,6 @@ use super::curve::{Curve, same};
 /// Chance that one comparison of units that are all the same says otherwise anywhere.
 pub const LEVEL: f64 = 0.01;
 
-/// One unit beside those that share a curve.
-#[derive(Debug, Clone)]
-pub(super) struct Member {
-    /// Different from the others by more than the errors explain.
-    pub is_own: bool,
-    /// Times the number of tests.
-    pub p_adjusted: f64,
-    /// From the mean of the others of the core; of all others where there is no core.
-    pub departure: Curve,
-}
-
 /// Whether a unit shares what the others have in common.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
@@ -30,13 +19,18 @@ pub struct Standing {
 
 /// The units apart from the core one after the other, the clearest first: so a unit that differs does
 /// not pull the mean that the next is held against. At the first step the chance of a false alarm is
-/// `LEVEL` over `statistics`, and later steps are taken only when it was none.
-pub(super) fn sort_out(curves: &[&Curve], statistics: usize) -> Option<Vec<Member>> {
+/// `LEVEL` over `statistics`, and later steps are taken only when it was none. Each with how far it is
+/// from the mean of the others of the core; of all others where there is no core.
+pub(super) fn sort_out<'a>(
+    names: impl Iterator<Item = &'a String>,
+    curves: &[Curve],
+    statistics: usize,
+) -> Option<(Vec<Standing>, Vec<Curve>)> {
     // Two units are one comparison.
     let of_units = if curves.len() == 2 { 1 } else { curves.len() };
     let tests = (of_units * statistics) as f64;
-    let mut core: Vec<usize> = (0..curves.len()).collect();
-    let mut members: Vec<Option<Member>> = vec![None; curves.len()];
+    let all: Vec<usize> = (0..curves.len()).collect();
+    let mut core = all.clone();
     while core.len() > 2 {
         let tried: Vec<(usize, f64)> =
             core.iter().map(|&i| Some((i, against(curves, &core, i)?.0))).collect::<Option<_>>()?;
@@ -48,36 +42,21 @@ pub(super) fn sort_out(curves: &[&Curve], statistics: usize) -> Option<Vec<Membe
     }
     // Of two that differ nobody knows which is the odd one.
     if let [a, b] = core[..]
-        && same(&[curves[a], curves[b]])? * tests < LEVEL
+        && same(&[&curves[a], &curves[b]])? * tests < LEVEL
     {
         core.clear();
     }
-    let all: Vec<usize> = (0..curves.len()).collect();
-    for (i, member) in members.iter_mut().enumerate() {
-        let others = if core.is_empty() { &all } else { &core };
-        let (p, departure) = against(curves, others, i)?;
-        let p_adjusted = (p * tests).min(1.0);
-        *member = Some(Member { is_own: !core.contains(&i), p_adjusted, departure });
-    }
-    members.into_iter().collect()
+    let one = |(i, unit): (usize, &String)| {
+        let (p, departure) = against(curves, if core.is_empty() { &all } else { &core }, i)?;
+        let (is_own, p_adjusted) = (!core.contains(&i), (p * tests).min(1.0));
+        Some((Standing { unit: unit.clone(), is_own, p_adjusted }, departure))
+    };
+    names.enumerate().map(one).collect()
 }
 
 /// Chance of unit `i` being as far from the mean of these units without it, and how far it is.
-fn against(curves: &[&Curve], units: &[usize], i: usize) -> Option<(f64, Curve)> {
-    let others: Vec<&Curve> = units.iter().filter(|j| **j != i).map(|j| curves[*j]).collect();
+fn against(curves: &[Curve], units: &[usize], i: usize) -> Option<(f64, Curve)> {
+    let others: Vec<&Curve> = units.iter().filter(|j| **j != i).map(|j| &curves[*j]).collect();
     let mean = Curve::mean(&others)?;
-    Some((same(&[curves[i], &mean])?, curves[i].minus(&mean)))
-}
-
-/// For the result.
-pub(super) fn standings<'a>(
-    names: impl Iterator<Item = &'a String>,
-    members: &[Member],
-) -> Vec<Standing> {
-    let one = |(unit, m): (&String, &Member)| Standing {
-        unit: unit.clone(),
-        is_own: m.is_own,
-        p_adjusted: m.p_adjusted,
-    };
-    names.zip(members).map(one).collect()
+    Some((same(&[&curves[i], &mean])?, curves[i].minus(&mean)))
 }

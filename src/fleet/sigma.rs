@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use super::curve::Curve;
-use super::own::{Member, Standing, sort_out, standings};
+use super::own::{Standing, sort_out};
 use super::unit::UnitModel;
 use crate::error::{Error, Result};
 use crate::model::SigmaModel;
@@ -105,16 +105,14 @@ pub(super) fn shared(
     let units: Vec<&UnitModel> = newest.iter().map(|(_, u)| *u).collect();
     let all_places = places(&units)?;
     let all: Vec<Curve> = units.iter().map(|u| curve(&u.model.sigma, &all_places)).collect();
-    let Some(members) = sort_out(&all.iter().collect::<Vec<_>>(), statistics) else {
-        return Ok(None);
-    };
+    let names = newest.iter().map(|(name, _)| name);
+    let Some((standings, departures)) = sort_out(names, &all, statistics) else { return Ok(None) };
     let at = |(i, &(z_m, theta_rad)): (usize, &Place)| {
         let values: Vec<(f64, f64)> = all.iter().map(|c| (c.values[i], c.variance(i))).collect();
         let shared = RandomEffects::of(&values)?;
-        let of_unit = |((name, _), (curve, member)): (&(String, &UnitModel), (&Curve, &Member))| {
-            let reach = student_quantile(0.95, member.departure.degrees_of_freedom)
-                * member.departure.std_error(i);
-            let ratio = |by: f64| (member.departure.values[i] + by).exp_m1();
+        let of_unit = |((name, _), (curve, off)): (&(String, &UnitModel), (&Curve, &Curve))| {
+            let reach = student_quantile(0.95, off.degrees_of_freedom) * off.std_error(i);
+            let ratio = |by: f64| (off.values[i] + by).exp_m1();
             let sigma_m = curve.values[i].exp();
             SigmaOfUnit {
                 unit: name.clone(),
@@ -131,10 +129,9 @@ pub(super) fn shared(
             common_interval_m: shared.common_interval.map(f64::exp),
             scatter: shared.scatter,
             scatter_interval: shared.scatter_interval,
-            units: newest.iter().zip(all.iter().zip(&members)).map(of_unit).collect(),
+            units: newest.iter().zip(all.iter().zip(&departures)).map(of_unit).collect(),
         })
     };
     let places = all_places.iter().enumerate().map(at).collect::<Option<Vec<_>>>();
-    let standings = standings(newest.iter().map(|(name, _)| name), &members);
     Ok(places.map(|places| SharedSigma { standings, places }))
 }
