@@ -43,15 +43,9 @@ impl Wanted {
     /// When it is no diagnosis, advises nothing, or a pose that cannot be.
     pub fn advised(path: &Path) -> Result<Self> {
         let text = read_json(path)?;
-        let refuse = |line: usize, what: String, remedy: &'static str| Error::Text {
-            path: path.into(),
-            line,
-            what,
-            remedy,
-        };
         let remedy = "give the diagnosis.json that kinoise diagnose wrote";
-        let diagnosis: Diagnosis =
-            serde_json::from_str(&text).map_err(|e| refuse(e.line(), plainly(&e), remedy))?;
+        let diagnosis: Diagnosis = serde_json::from_str(&text)
+            .map_err(|e| Error::text(path, e.line(), plainly(&e), remedy))?;
         let mut views: Vec<WantedView> = Vec::new();
         for next in diagnosis.findings.into_iter().filter_map(|f| f.next_view) {
             let NextView { z_m, theta_rad, azimuth_rad, why } = next;
@@ -60,7 +54,7 @@ impl Wanted {
                 && azimuth_rad.abs() < 100.0;
             if !possible {
                 let what = format!("no board stands at {z_m} m, {theta_rad} rad");
-                return Err(refuse(0, what, remedy));
+                return Err(Error::text(path, 0, what, remedy));
             }
             let tolerance = Tolerance {
                 z_m: 0.1 * z_m,
@@ -76,7 +70,7 @@ impl Wanted {
         }
         if views.is_empty() {
             let remedy = "leave --advise out to take the paper's grid";
-            return Err(refuse(0, "the diagnosis advises no further view".into(), remedy));
+            return Err(Error::text(path, 0, "the diagnosis advises no further view", remedy));
         }
         Ok(Wanted { views, any: false })
     }
