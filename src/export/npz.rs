@@ -1,9 +1,14 @@
-//! NumPy's archive of arrays: a zip of .npy files, stored (numpy.lib.format; PKWARE APPNOTE 6.3).
+//! NumPy's archive of arrays: a zip of .npy files, stored (numpy.lib.format).
+
+use std::io::{Cursor, Write};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::Exported;
 use super::program::correction_of;
 use super::tables::{SigmaTable, even, frontal, notes_of_bias};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::NoiseModel;
 
 /// Depths of the correction, evenly in disparity: linear between two, a bowl that grows with the
@@ -12,26 +17,26 @@ const DEPTHS: usize = 9;
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     let sigma = SigmaTable::of(model);
-    let mut archive = Archive::default();
+    let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::new())));
     let doubles = |numbers: &[f64]| numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
     let mut put = |name: &str, shape: &[usize], numbers: &[f64]| {
-        archive.add(name, &array("<f8", shape, doubles(numbers)));
+        archive.add(name, &array("<f8", shape, doubles(numbers)))
     };
     let (n, m) = (sigma.z_m.len(), sigma.theta_rad.len());
-    put("sigma_z_m", &[n], &sigma.z_m);
-    put("sigma_theta_rad", &[m], &sigma.theta_rad);
-    put("sigma_m", &[n, m], &sigma.sigma_m);
+    put("sigma_z_m", &[n], &sigma.z_m)?;
+    put("sigma_theta_rad", &[m], &sigma.theta_rad)?;
+    put("sigma_m", &[n, m], &sigma.sigma_m)?;
     let mut notes = Vec::new();
     match correction_of(model)? {
         None => notes.push("the model has no sensor: sigma's table alone is in the file".into()),
         Some((_, correction)) => {
             let camera = &correction.camera;
-            put("intrinsics", &[4], &[camera.fx, camera.fy, camera.cx, camera.cy]);
-            put("distortion", &[5], &camera.distortion.unwrap_or_default());
+            put("intrinsics", &[4], &[camera.fx, camera.fy, camera.cx, camera.cy])?;
+            put("distortion", &[5], &camera.distortion.unwrap_or_default())?;
             let [near, far] = model.sigma.domain.z_m;
             let depths: Vec<f64> =
                 even([1.0 / far, 1.0 / near], DEPTHS).iter().rev().map(|q| 1.0 / q).collect();
-            put("correction_z_m", &[DEPTHS], &depths);
+            put("correction_z_m", &[DEPTHS], &depths)?;
             let mut all = Vec::new();
             for &depth in &depths {
                 let stored = f64::from(depth as f32);
@@ -39,7 +44,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
                 all.extend(corrected.iter().flat_map(|z| ((z - stored) as f32).to_le_bytes()));
             }
             let shape = [DEPTHS, camera.height, camera.width];
-            archive.add("correction_m", &array("<f4", &shape, all));
+            archive.add("correction_m", &array("<f4", &shape, all))?;
             notes = notes_of_bias(&correction);
             if !correction.variance.is_empty() {
                 notes.push(
@@ -48,7 +53,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
             }
         }
     }
-    Ok(Exported { bytes: archive.finish(), notes })
+    Ok(Exported { bytes: archive.finish()?, notes })
 }
 
 /// An .npy file, version 1.0.
@@ -66,47 +71,22 @@ fn array(kind: &str, shape: &[usize], data: Vec<u8>) -> Vec<u8> {
     file
 }
 
-/// A zip without compression.
-#[derive(Default)]
-struct Archive {
-    bytes: Vec<u8>,
-    directory: Vec<u8>,
-    files: u16,
-}
-
-/// Version 2.0 wrote it, no flags, stored, at midnight of 1980-01-01.
-const COMMON: [u16; 5] = [20, 0, 0, 0, 33];
+/// A zip without compression, its bytes whatever the time.
+struct Archive(ZipWriter<Cursor<Vec<u8>>>);
 
 impl Archive {
-    fn add(&mut self, name: &str, data: &[u8]) {
-        let name = format!("{name}.npy");
-        let begin = self.bytes.len() as u32;
-        let words = |words: &[u16]| words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<_>>();
-        let size = data.len() as u32;
-        let mut common = words(&COMMON);
-        common.extend([crc32fast::hash(data), size, size].iter().flat_map(|v| v.to_le_bytes()));
-        common.extend(words(&[name.len() as u16, 0]));
-        self.bytes.extend(b"PK\x03\x04");
-        self.bytes.extend(&common);
-        self.bytes.extend(name.as_bytes());
-        self.bytes.extend(data);
-        self.directory.extend(b"PK\x01\x02");
-        self.directory.extend(words(&[20]));
-        self.directory.extend(&common);
-        self.directory.extend(words(&[0, 0, 0, 0, 0]));
-        self.directory.extend(begin.to_le_bytes());
-        self.directory.extend(name.as_bytes());
-        self.files += 1;
+    fn add(&mut self, name: &str, data: &[u8]) -> Result<()> {
+        let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        let options = stored.last_modified_time(DateTime::default());
+        self.0.start_file(format!("{name}.npy"), options).map_err(failed)?;
+        self.0.write_all(data).map_err(failed)
     }
 
-    fn finish(mut self) -> Vec<u8> {
-        let (begin, size) = (self.bytes.len() as u32, self.directory.len() as u32);
-        self.bytes.extend(&self.directory);
-        self.bytes.extend(b"PK\x05\x06");
-        let counts = [0, 0, self.files, self.files];
-        self.bytes.extend(counts.iter().flat_map(|w| w.to_le_bytes()));
-        self.bytes.extend([size, begin].iter().flat_map(|v| v.to_le_bytes()));
-        self.bytes.extend([0, 0]);
-        self.bytes
+    fn finish(self) -> Result<Vec<u8>> {
+        Ok(self.0.finish().map_err(failed)?.into_inner())
     }
+}
+
+fn failed(e: impl std::fmt::Display) -> Error {
+    Error::Drawing { what: "NPZ", why: e.to_string() }
 }
