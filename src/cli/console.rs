@@ -37,8 +37,8 @@ impl Verbosity {
     }
 }
 
-fn print(least: u8, text: &str) {
-    if LEVEL.load(Ordering::Relaxed) >= least {
+fn print(min_level: u8, text: &str) {
+    if LEVEL.load(Ordering::Relaxed) >= min_level {
         let mut err = std::io::stderr().lock();
         let _ = writeln!(err, "{}", escaped(text, |c| c == '\n'));
     }
@@ -99,11 +99,11 @@ pub fn one_line(text: &str) -> String {
 
 /// One line. What would end it within, in somebody's name, is made visible; an empty line before or
 /// after it may be asked for.
-fn print_line(least: u8, text: &str) {
+fn print_line(min_level: u8, text: &str) {
     let line = text.trim_matches('\n');
     let begin = text.len() - text.trim_start_matches('\n').len();
     let (before, after) = (&text[..begin], &text[(begin + line.len()).min(text.len())..]);
-    print(least, &format!("{before}{}{after}", escaped(line, |_| false)));
+    print(min_level, &format!("{before}{}{after}", escaped(line, |_| false)));
 }
 
 /// What the command was run for, a line; also with --quiet.

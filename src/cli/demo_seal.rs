@@ -161,9 +161,9 @@ fn why(id: &str, diagnosis: &Diagnosis) -> String {
         return format!("It says that it cannot tell: {}.", blind.why);
     }
     let minimum = diagnosis.detectable.iter().find(|d| d.effect == id).map(|d| &d.minimum);
-    minimum.map_or_else(String::new, |least| {
+    minimum.map_or_else(String::new, |minimum| {
         let each =
-            least.iter().filter_map(|(name, v)| Some(format!("{name} {}", digits(v.as_f64()?))));
+            minimum.iter().filter_map(|(name, v)| Some(format!("{name} {}", digits(v.as_f64()?))));
         let each: Vec<String> = each.collect();
         format!("By its own account it would see it from {} on.", each.join(", "))
     })

@@ -175,7 +175,7 @@ impl Case<'_> {
         let bias = added.iter().flat_map(|e| &e.shape).filter(|t| t.is_correctable());
         let bias: Vec<Term> = bias.cloned().collect();
         let checked = referenced_views(&self.fields, &self.survey, &bias, &known);
-        if checked.len() >= laws::FEWEST {
+        if checked.len() >= laws::MIN_VIEWS {
             anchor(added, &checked, &Scatter::of(&checked).variances, camera);
         } else {
             let_planes_be(added, camera);

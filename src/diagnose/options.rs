@@ -40,7 +40,7 @@ pub enum Ablation {
 }
 
 /// Fewest views that anything is said about.
-pub const FEWEST_VIEWS: usize = 3;
+pub const MIN_VIEWS: usize = 3;
 /// Single frames kept whole: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 

@@ -19,14 +19,14 @@ pub struct ClockOffset {
 impl ClockOffset {
     /// Beyond what chance and the truth's own sampling make.
     pub fn is_significant(&self) -> bool {
-        self.seconds.abs() > (SURE * self.std_error_s).max(LEAST_S)
+        self.seconds.abs() > (SURE * self.std_error_s).max(MIN_S)
     }
 }
 
 /// Standard errors: a chance of 0.3 % for Gaussian errors.
 const SURE: f64 = 3.0;
 /// Motion capture has a pose every 10 ms; a tenth of that is not followed between them.
-const LEAST_S: f64 = 0.001;
+const MIN_S: f64 = 0.001;
 /// Motions are taken over this, s: over a frame alone a mapper's noise is as large as what it turns.
 const INTERVAL_S: f64 = 0.1;
 /// Offsets that are tried, s, and their step: a tenth of the interval.

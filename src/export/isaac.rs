@@ -36,9 +36,9 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
         even([1.0 / far, 1.0 / near], NODES).iter().map(|q| px(1.0 / q)).collect();
     let mean_square = sizes.iter().map(|s| s * s).sum::<f64>() / sizes.len() as f64;
     let sigma_px = (mean_square - step_px * step_px / 12.0).max(0.0).sqrt();
-    let [least, most] = crate::stats::range(sizes);
+    let [min, max] = crate::stats::range(sizes);
     notes.push(format!(
-        "Isaac Sim has one sigma in px: {sigma_px:.3}; the model has {least:.3} to {most:.3} px between {near:.2} and {far:.2} m at {:.0} degrees, and more on steeper surfaces",
+        "Isaac Sim has one sigma in px: {sigma_px:.3}; the model has {min:.3} to {max:.3} px between {near:.2} and {far:.2} m at {:.0} degrees, and more on steeper surfaces",
         theta.to_degrees()
     ));
     let window = parameter(model, "spatial-correlation", "length_px");

@@ -76,9 +76,9 @@ impl Scan<'_> {
     /// The robust plane through the mean of all frames.
     fn refit(&self, target: &Target) -> Plane {
         let mut w = vec![f32::NAN; self.bench.sensor.camera.pixels()];
-        let fewest = (self.lagged.frames as u32 / 4).max(1);
+        let min_readings = (self.lagged.frames as u32 / 4).max(1);
         for (k, &i) in self.pixels.iter().enumerate() {
-            if self.count[k] >= fewest {
+            if self.count[k] >= min_readings {
                 let mean = self.sum[k] / f64::from(self.count[k]);
                 w[i as usize] = (1.0 / (f64::from(self.expected[k]) + mean)) as f32;
             }

@@ -46,10 +46,10 @@ pub(super) fn by_cell(
 }
 
 /// Standard deviation inside +-[`CUT_SIGMAS`] of itself, corrected for the cut.
-pub(super) fn settled_scale(residuals: Vec<f32>, least: f64) -> f64 {
+pub(super) fn settled_scale(residuals: Vec<f32>, min_scale: f64) -> f64 {
     let mut off: Vec<f32> = residuals.iter().map(|e| e.abs()).collect();
     let mad = f64::from(median_in_place(&mut off));
-    let mut scale = if mad.is_finite() { (MAD_TO_SIGMA * mad).max(least) } else { least };
+    let mut scale = if mad.is_finite() { (MAD_TO_SIGMA * mad).max(min_scale) } else { min_scale };
     let factor = normal_cut_factor(CUT_SIGMAS);
     for _ in 0..CUT_ROUNDS {
         let cut = CUT_SIGMAS * scale;
@@ -61,7 +61,7 @@ pub(super) fn settled_scale(residuals: Vec<f32>, least: f64) -> f64 {
                 sum += e * e;
             }
         }
-        let next = if n > 0.0 { (sum / n / factor).sqrt().max(least) } else { least };
+        let next = if n > 0.0 { (sum / n / factor).sqrt().max(min_scale) } else { min_scale };
         let settled = (next / scale - 1.0).abs() < 1e-4;
         scale = next;
         if settled {

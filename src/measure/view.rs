@@ -62,7 +62,7 @@ pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(u
 }
 
 /// So many views are no chance: one in 32 where either reading alike finds a plane that the other does not.
-const FEWEST_RANGES: usize = 5;
+const MIN_RANGES: usize = 5;
 
 /// What to say where excluded views hold a plane once their raw values are taken for ranges, and none as depths.
 pub fn ranges_remark(
@@ -70,7 +70,7 @@ pub fn ranges_remark(
     excluded: &[Excluded],
     bench: &Workbench<'_>,
 ) -> Option<String> {
-    if excluded.len() < FEWEST_RANGES {
+    if excluded.len() < MIN_RANGES {
         return None;
     }
     let ranges = Workbench { ray_share: 1.0, ..Workbench::new(bench.sensor, bench.options) };
@@ -78,7 +78,7 @@ pub fn ranges_remark(
     let alone = |v: &&&View| view_target(v, &ranges).is_ok() && view_target(v, bench).is_err();
     let views: Vec<&View> = recording.views.iter().filter(left_out).collect();
     let flat = views.par_iter().filter(alone).count();
-    (flat >= FEWEST_RANGES).then(|| {
+    (flat >= MIN_RANGES).then(|| {
         format!(
             "{flat} of the views that were left out hold a plane once raw values are taken for ranges (the length of \
              the ray) instead of depths: `kinoise diagnose -m MODEL` tests this, and `kinoise correct` with the model \

@@ -171,8 +171,8 @@ impl Moments {
             return None;
         }
         let eigen = SymmetricEigen::new(self.covariance());
-        let least = eigen.eigenvalues.imin();
-        let mut normal: Vector3<f64> = eigen.eigenvectors.column(least).into_owned();
+        let smallest = eigen.eigenvalues.imin();
+        let mut normal: Vector3<f64> = eigen.eigenvectors.column(smallest).into_owned();
         let mut rho = normal.dot(&self.centroid());
         if rho < 0.0 {
             normal = -normal;

@@ -11,8 +11,8 @@ use crate::units::shortest;
 
 /// Nodes along one axis, and harmonics or orders of a series: more than any fit has; a file that
 /// asks for more is damaged, and would be believed with memory.
-const MOST_NODES: usize = 4096;
-const MOST_ORDERS: usize = 16;
+const MAX_NODES: usize = 4096;
+const MAX_ORDERS: usize = 16;
 /// Of a polynomial of two coordinates.
 const DEGREES: std::ops::RangeInclusive<usize> = 2..=4;
 
@@ -154,8 +154,8 @@ impl Modulation {
             Modulation::DisparityPower(power) => {
                 within("its power of the disparity", &[power], [-MAX_POWER, MAX_POWER])
             }
-            Modulation::TiltPower(power) => (!(0..=MOST_ORDERS as i32).contains(&power))
-                .then(|| format!("its power of the tilt, {power}, is not from 0 to {MOST_ORDERS}")),
+            Modulation::TiltPower(power) => (!(0..=MAX_ORDERS as i32).contains(&power))
+                .then(|| format!("its power of the tilt, {power}, is not from 0 to {MAX_ORDERS}")),
             Modulation::RadialSlope { fx, fy } => within("fx or fy", &[fx, fy], FOCAL_PX),
             _ => None,
         }
@@ -178,13 +178,13 @@ fn rising(low: f64, high: f64) -> Option<String> {
 }
 
 fn some_orders(orders: usize) -> Option<String> {
-    (!(1..=MOST_ORDERS).contains(&orders))
-        .then(|| format!("{orders} orders or harmonics are not from 1 to {MOST_ORDERS}"))
+    (!(1..=MAX_ORDERS).contains(&orders))
+        .then(|| format!("{orders} orders or harmonics are not from 1 to {MAX_ORDERS}"))
 }
 
 fn some_nodes(nodes: &[usize]) -> Option<String> {
-    let bad = nodes.iter().find(|n| !(2..=MOST_NODES).contains(*n))?;
-    Some(format!("{bad} nodes are not from 2 to {MOST_NODES}"))
+    let bad = nodes.iter().find(|n| !(2..=MAX_NODES).contains(*n))?;
+    Some(format!("{bad} nodes are not from 2 to {MAX_NODES}"))
 }
 
 fn picture(width: f64, height: f64, nodes: [usize; 2]) -> Option<String> {

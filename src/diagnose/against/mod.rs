@@ -17,7 +17,7 @@ use crate::diagnose::noise::structure::{Structure, structures};
 use crate::diagnose::noise::tails::{Confusers, tails};
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::texture_findings;
-use crate::diagnose::options::{DiagnoseOptions, FEWEST_VIEWS, measure_options};
+use crate::diagnose::options::{DiagnoseOptions, MIN_VIEWS, measure_options};
 use crate::diagnose::steps::lattice::Quantisation;
 use crate::diagnose::steps::{Steps, lattice};
 use crate::diagnose::views::field::Field;
@@ -83,7 +83,7 @@ impl Baseline {
             }
         }
         *fields = kept;
-        if theirs.len() < FEWEST_VIEWS {
+        if theirs.len() < MIN_VIEWS {
             return Err(Error::NotEnough {
                 what: format!("{} of {all} views have a partner in {}", theirs.len(), simulated.root.display()),
                 remedy: "simulate the very views of the recording (kinoise simulate OUT --like REC), three at least".into(),

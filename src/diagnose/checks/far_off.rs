@@ -9,7 +9,7 @@ use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Axis, Statistic};
 
 /// One view may show something else: two, and a quarter of all.
-const FEWEST: usize = 2;
+const MIN_VIEWS: usize = 2;
 const SHARE: usize = 4;
 
 /// Beyond the clip a residual is no noise, and noise that is as much smaller or larger than the model's is
@@ -55,7 +55,7 @@ pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
 fn reached(mut of_views: Vec<f64>) -> Option<f64> {
     of_views.retain(|x| x.is_finite());
     of_views.sort_by(|a, b| b.total_cmp(a));
-    of_views.get(of_views.len().div_ceil(SHARE).max(FEWEST) - 1).copied()
+    of_views.get(of_views.len().div_ceil(SHARE).max(MIN_VIEWS) - 1).copied()
 }
 
 #[cfg(test)]

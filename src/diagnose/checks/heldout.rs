@@ -18,7 +18,7 @@ use crate::terms::{Statistic, Term};
 /// A share of the views is kept aside.
 const KEPT_ASIDE: usize = 4;
 /// With fewer views than this none can be spared.
-const FEWEST: usize = 6;
+const MIN_VIEWS: usize = 6;
 
 impl Case<'_> {
     /// Choose again without some views, and score those. The errors of single `lines` and textures are learnt
@@ -31,7 +31,7 @@ impl Case<'_> {
         let (survey, seed) = (&self.survey, self.options.seed);
         let (camera, scale_px_m) = (&self.sensor().camera, self.fields[0].scale_px_m);
         let n = survey.views.len();
-        if n < FEWEST {
+        if n < MIN_VIEWS {
             return None;
         }
         let mut rng = seed.stream("diagnose/heldout");

@@ -15,7 +15,7 @@ use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::Detectable;
 use crate::diagnose::finding::pixels::terms_of;
 use crate::diagnose::finding::scene::Scene;
-use crate::diagnose::search::LEAST_SHARE_OF_GAIN;
+use crate::diagnose::search::MIN_SHARE_OF_GAIN;
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::{Evidence, gain, root};
 use crate::diagnose::search::null::Null;
@@ -66,7 +66,7 @@ impl Quadratic {
 
 impl DetectionCriteria<'_> {
     /// Multiple of the term, which is of size one, that is seen; `None` where none is.
-    pub fn least(&self, unit: &Term) -> Option<f64> {
+    pub fn min_size(&self, unit: &Term) -> Option<f64> {
         // Beside sigma's own refit, what follows depth and tilt alone is not looked for.
         if self.beside.is_some() && !beyond_sigma(&Candidate::curve(unit.basis.clone())) {
             return None;
@@ -80,7 +80,7 @@ impl DetectionCriteria<'_> {
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
         let threshold = self.outcome.noise.threshold(self.rules.level);
         let need =
-            null.gain_for(threshold, views.len(), &self.rules).max(LEAST_SHARE_OF_GAIN * first);
+            null.gain_for(threshold, views.len(), &self.rules).max(MIN_SHARE_OF_GAIN * first);
         let sum = Evidence::sum(u.len(), 0.0, &views).a;
         let information = u.dot(&(&sum * &u));
         if !need.is_finite() || information <= 0.0 {
@@ -108,8 +108,8 @@ impl DetectionCriteria<'_> {
             .collect();
         let mut sizes = sizes?;
         sizes.sort_by(f64::total_cmp);
-        let least = sizes[(POWER * (sizes.len() - 1) as f64).ceil() as usize];
-        (least > 0.0 && least.is_finite()).then_some(least)
+        let min_size = sizes[(POWER * (sizes.len() - 1) as f64).ceil() as usize];
+        (min_size > 0.0 && min_size.is_finite()).then_some(min_size)
     }
 
     /// The views without what was found: it would not be taken for an effect more.
@@ -200,7 +200,7 @@ impl Case<'_> {
         for (statistic, gates) in [(Statistic::Bias, &of_mean), (Statistic::Variance, &of_size)] {
             let can = effects::that_change(statistic).into_iter();
             for effect in can.filter(|e| e.card().applies_to(bounds.kind)) {
-                let smallest = effect.smallest(&bounds).and_then(|s| least(s, statistic, gates));
+                let smallest = effect.smallest(&bounds).and_then(|s| min_size(s, statistic, gates));
                 all.extend(
                     smallest.map(|minimum| Detectable { effect: effect.card().id, minimum }),
                 );
@@ -210,15 +210,15 @@ impl Case<'_> {
     }
 }
 
-fn least(
+fn min_size(
     smallest: Smallest,
     statistic: Statistic,
     gates: &DetectionCriteria<'_>,
 ) -> Option<Map<String, Value>> {
     let Smallest { parameter, shape, unit, of } = smallest;
     let term = Term { statistic, basis: shape, coefficients: unit };
-    let least = gates.least(&term).map(of).filter(|least| least.is_finite())?;
-    Some(Map::from_iter([(parameter.to_string(), json!(least))]))
+    let min_size = gates.min_size(&term).map(of).filter(|min_size| min_size.is_finite())?;
+    Some(Map::from_iter([(parameter.to_string(), json!(min_size))]))
 }
 
 #[cfg(test)]

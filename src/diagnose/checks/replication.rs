@@ -16,7 +16,7 @@ use crate::stats::student_quantile;
 /// Standard errors from which on a half sees something by itself.
 const SEEN: f64 = 2.0;
 /// What a half knows by less than this share of what all views know, it tells nothing of.
-const LEAST_KNOWN: f64 = 0.1;
+const MIN_KNOWN: f64 = 0.1;
 /// Two-sided.
 const INTERVAL: f64 = 0.95;
 /// Views that are neighbours in distance; these are dealt out by tilt.
@@ -164,7 +164,7 @@ impl Halves {
         let block = |m: &DMatrix<f64>| {
             DMatrix::from_fn(columns.len(), columns.len(), |i, k| m[(columns[i], columns[k])])
         };
-        let hardly_known = LEAST_KNOWN * block(&self.metric);
+        let hardly_known = MIN_KNOWN * block(&self.metric);
         let alone = |half: &Half| {
             let mut left = &half.beta - &self.whole;
             columns.iter().for_each(|&c| left[c] = half.beta[c]);

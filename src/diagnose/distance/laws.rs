@@ -35,7 +35,7 @@ pub struct Law {
 }
 
 /// Fewer references than this can be fitted by anything.
-pub const FEWEST: usize = 5;
+pub const MIN_VIEWS: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
@@ -126,7 +126,7 @@ impl<'a> References<'a> {
 
 /// All laws, with what each gains on references left out; none where there are too few.
 pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
-    if checked.len() < FEWEST {
+    if checked.len() < MIN_VIEWS {
         return Vec::new();
     }
     let mut references = References::of(checked, nuisances);

@@ -1,7 +1,7 @@
 //! What planes alone cannot tell: offset, scale and drift, where distances were measured by other
 //! means.
 
-use super::laws::{FEWEST, Law, Nuisances, laws};
+use super::laws::{Law, MIN_VIEWS, Nuisances, laws};
 use super::referenced_view::referenced_views;
 use crate::diagnose::case::Case;
 use crate::diagnose::checks::overstated::SHARE;
@@ -23,7 +23,7 @@ use crate::terms::{Axis, Statistic, Term};
 /// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
 /// planes are not better.
 const CLEAR_LAW_ERRORS: f64 = 1.2;
-const LEAST_M: f64 = 0.0015;
+const MIN_M: f64 = 0.0015;
 /// Names that predict as well as the best within this many nats cannot be told apart.
 const AS_GOOD_NATS: f64 = 3.0;
 
@@ -55,7 +55,7 @@ pub fn findings(
     let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
     let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
     // So large a law may be missing in the model, too, where it was learnt from references.
-    let clear = best.rms_errors > CLEAR_LAW_ERRORS * excess.sqrt() && best.rms_m > LEAST_M;
+    let clear = best.rms_errors > CLEAR_LAW_ERRORS * excess.sqrt() && best.rms_m > MIN_M;
     if !clear || calibrated_gain(best) < noise.threshold(level) {
         return Vec::new();
     }
@@ -139,7 +139,7 @@ impl Case<'_> {
     /// Laws of the distance, by reference distances.
     pub(in crate::diagnose) fn laws(&self, bias: &[Term], bent_m: f64) -> Vec<Finding> {
         let ours = references(&self.fields);
-        if ours < FEWEST {
+        if ours < MIN_VIEWS {
             return Vec::new();
         }
         // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
@@ -195,12 +195,12 @@ pub fn references(fields: &[Field]) -> usize {
 
 /// What planes alone never tell.
 pub fn cannot_tell(fields: &[Field], kind: Option<SensorKind>) -> Vec<CannotTell> {
-    if references(fields) >= FEWEST {
+    if references(fields) >= MIN_VIEWS {
         return Vec::new();
     }
     let why = |what: &str| {
         format!(
-            "{what} is not identifiable from planes without a reference distance: every plane takes it up whole. Measure the distance of the target in at least {FEWEST} views with a tape or a rail and give it as reference_distance_m."
+            "{what} is not identifiable from planes without a reference distance: every plane takes it up whole. Measure the distance of the target in at least {MIN_VIEWS} views with a tape or a rail and give it as reference_distance_m."
         )
     };
     let mut all = vec![

@@ -90,13 +90,13 @@ fn level_error_px(view: &SurveyedView) -> Option<f64> {
 /// Targets tilted by less, as a slope, and fewer of them than this, do not tell where they were
 /// measured.
 const TILTED: f64 = 0.2;
-const FEWEST_TILTED: usize = 5;
+const MIN_TILTED: usize = 5;
 
 /// On a tilted target the distance depends on where the optical axis is taken to meet it: by two
 /// angles, which are fitted beside every law where there are views enough.
 pub fn is_tilted(checked: &[ReferencedView]) -> bool {
     let steep = |c: &&ReferencedView| c.slope[0].hypot(c.slope[1]) > TILTED;
-    checked.iter().filter(steep).count() >= FEWEST_TILTED && checked.len() >= 2 * FEWEST_TILTED
+    checked.iter().filter(steep).count() >= MIN_TILTED && checked.len() >= 2 * MIN_TILTED
 }
 
 /// A tape is read to half a millimetre at best.

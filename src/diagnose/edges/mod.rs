@@ -61,7 +61,7 @@ pub struct Edges {
 }
 
 /// Rows of fewer pixels than this show nothing of a side.
-const FEWEST_ROWS: f64 = 8.0;
+const MIN_ROWS: f64 = 8.0;
 
 impl Edges {
     /// Pixels lost in a frame on a side (0 left, 1 right).
@@ -72,6 +72,6 @@ impl Edges {
     /// What is beside the target on a side in a frame; `None` where too few rows were seen.
     pub fn beside(&self, side: usize) -> Option<EdgeLoss> {
         let beside = EdgeLoss { lost: self.lost_px(side), ..self.sides[side] };
-        (beside.rows >= FEWEST_ROWS).then_some(beside)
+        (beside.rows >= MIN_ROWS).then_some(beside)
     }
 }

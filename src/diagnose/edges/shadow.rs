@@ -27,7 +27,7 @@ pub struct Band {
     pub of_some: Option<[usize; 2]>,
 }
 
-const FEWEST_VIEWS: usize = 3;
+const MIN_VIEWS: usize = 3;
 /// The other side has less than this share of it.
 const OTHER_SIDE: f64 = 0.4;
 /// A shadow is no wider than this share of what geometry has: pixels that see both surfaces are
@@ -64,7 +64,7 @@ fn law(views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> Option<ViewMean> {
 fn by_side(views: &[Sides]) -> [(Vec<EdgeLoss>, Option<ViewMean>); 2] {
     [0, 1].map(|side: usize| {
         let seen: Vec<EdgeLoss> = views.iter().filter_map(|s| s.0[side]).collect();
-        let enough = seen.len() >= FEWEST_VIEWS;
+        let enough = seen.len() >= MIN_VIEWS;
         let share = enough.then(|| law(&seen, |v| v.shaded)).flatten();
         (seen, share)
     })

@@ -82,7 +82,7 @@ impl Outlook<'_> {
     /// A view of the target, its middle on the optical axis; `None` when too little is seen.
     pub fn view(&self, plane: &Plane) -> Option<ViewData> {
         let (data, measured) = self.look(plane);
-        let enough = data.places.len() > FEWEST_PATCHES && measured > MIN_PIXELS as f64;
+        let enough = data.places.len() > MIN_PATCHES && measured > MIN_PIXELS as f64;
         enough.then_some(data)
     }
 
@@ -162,7 +162,7 @@ impl Outlook<'_> {
 }
 
 /// Fewer carry no plane.
-const FEWEST_PATCHES: usize = 12;
+const MIN_PATCHES: usize = 12;
 
 /// What all views of a layer have in common when another is taken.
 pub fn outlook<'a>(

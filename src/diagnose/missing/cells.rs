@@ -41,7 +41,7 @@ pub fn cells(patches: &[Vec<Patch>]) -> Vec<Vec<Cell<'_>>> {
 /// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
 const ACROSS: usize = 16;
 /// A smaller patch, in tiles, says little.
-const FEWEST_TILES: usize = 2;
+const MIN_TILES: usize = 2;
 
 /// All views in patches large enough to judge.
 pub fn patches(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Patch>> {
@@ -62,7 +62,7 @@ pub fn patches(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<P
             Patch { place, lost, asked }
         };
         let mut groups = in_patches(&view.places, side, apart);
-        groups.retain(|group| group.len() >= FEWEST_TILES);
+        groups.retain(|group| group.len() >= MIN_TILES);
         groups.into_iter().map(of_group).collect()
     };
     survey.views.iter().map(of_view).collect()
@@ -141,7 +141,7 @@ pub struct Scatter {
 pub const USUAL: Scatter =
     Scatter { level: 1.0, slope: 4.0, cell: 0.5, differing: 0.5, clump: 4.0 };
 /// Never believed to be less.
-pub const LEAST: Scatter =
+pub const MIN_SCATTER: Scatter =
     Scatter { level: 0.1, slope: 0.4, cell: 0.1, differing: 0.1, clump: 1.0 };
 /// What a few views show is taken so much larger.
 pub const FEW: f64 = 4.0;
@@ -199,9 +199,9 @@ impl Whitener {
 }
 
 impl Scatter {
-    /// What is left of the views' log odds, and no less than `least`: their levels and slopes by least
+    /// What is left of the views' log odds, and no less than `min`: their levels and slopes by least
     /// squares, then the cells about them.
-    pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], least: Scatter) -> Self {
+    pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], min: Scatter) -> Self {
         let (mut sums, mut n) = ([0.0; 4], [0.0; 4]);
         let mut neighbours = Neighbours::default();
         for (cells, left) in views.iter().zip(left) {
@@ -222,11 +222,11 @@ impl Scatter {
         let mean = |k: usize| sums[k] / f64::max(n[k], 1.0);
         let few = 1.0 + FEW / f64::max(n[0], 1.0);
         Scatter {
-            level: (few * mean(0)).max(least.level),
-            slope: (few * mean(1)).max(least.slope),
-            cell: mean(2).max(least.cell),
-            differing: mean(3).max(least.differing),
-            clump: neighbours.size().max(least.clump),
+            level: (few * mean(0)).max(min.level),
+            slope: (few * mean(1)).max(min.slope),
+            cell: mean(2).max(min.cell),
+            differing: mean(3).max(min.differing),
+            clump: neighbours.size().max(min.clump),
         }
     }
 }

@@ -27,7 +27,7 @@ use crate::diagnose::views::margins::Margins;
 use crate::diagnose::views::tiles::rim_px;
 use crate::rng::Seed;
 use crate::terms::{Axis, Extent};
-use cells::{Cell, LEAST, USUAL, cells, expected, fine, patches};
+use cells::{Cell, MIN_SCATTER, USUAL, cells, expected, fine, patches};
 use dropout_cells::DropoutCells;
 use few::few_losses;
 use hard_end::{CloseLook, HardEnd, blur};
@@ -59,15 +59,15 @@ impl DropoutOutcome {
 }
 
 /// Fewer views show no rule.
-const FEWEST_VIEWS: usize = 4;
+const MIN_VIEWS: usize = 4;
 /// Chance of a finding on a clean recording: the steps and curves, and the shadow.
 pub const LEVEL: f64 = 0.003;
 /// By which it may come: of what is always there, of what begins in the midst, and of a rise's foot.
 const TESTS: f64 = 3.0;
 const SHADOW_LEVEL: f64 = 0.0005;
-const MOST_FINDINGS: usize = 3;
+const MAX_FINDINGS: usize = 3;
 /// A later finding must bring this share of what the first brought.
-const LEAST_OF_FIRST: f64 = 0.1;
+const MIN_OF_FIRST: f64 = 0.1;
 
 /// What the losses of a recording follow.
 ///
@@ -124,19 +124,19 @@ impl DropoutSearch<'_> {
     fn losses(&self, seen: &DropoutCells<'_>) -> DropoutOutcome {
         let views = &seen.cells;
         let mut outcome = DropoutOutcome::default();
-        if views.iter().filter(|v| !v.is_empty()).count() < FEWEST_VIEWS {
+        if views.iter().filter(|v| !v.is_empty()).count() < MIN_VIEWS {
             return outcome;
         }
         let shapes = Shapes::of(self.reach, self.camera, times(views));
         let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
         let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
         let mut taken: Vec<Axis> = Vec::new();
-        while outcome.findings.len() < MOST_FINDINGS {
+        while outcome.findings.len() < MAX_FINDINGS {
             let open = shapes.beside(&taken);
-            let of = |steps: &[Step], least| {
-                Round::of(views, &explained, (steps, &open.curves), least, self.seed)
+            let of = |steps: &[Step], min_scatter| {
+                Round::of(views, &explained, (steps, &open.curves), min_scatter, self.seed)
             };
-            let Some(always) = of(&open.steps, LEAST) else { break };
+            let Some(always) = of(&open.steps, MIN_SCATTER) else { break };
             if outcome.findings.is_empty() {
                 outcome.detectable = detectable(&always.ledger, &shapes.steps, always.threshold());
             }
@@ -153,7 +153,7 @@ impl DropoutSearch<'_> {
             }
             let Some((won, counts)) = won else { break };
             let (won, Round { ledger, judged, noise }) = (&round.judged[won], &round);
-            if outcome.findings.first().is_some_and(|f| won.gain < LEAST_OF_FIRST * f.share) {
+            if outcome.findings.first().is_some_and(|f| won.gain < MIN_OF_FIRST * f.share) {
                 break;
             }
             let p = noise.p(counts);

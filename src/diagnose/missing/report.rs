@@ -214,7 +214,7 @@ fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f
 
 /// What would be seen of these steps, by where the faintest that is has its middle.
 pub fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<Detectable> {
-    let least = |s: Step| {
+    let minimum = |s: Step| {
         let (name, value) = match (s.axis, s.width > 0.0) {
             (Axis::Theta, _) => ("theta50_deg", s.middle.to_degrees()),
             (_, true) => ("z50_m", s.middle),
@@ -223,7 +223,7 @@ pub fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<De
         let minimum = Map::from_iter([(name.to_string(), json!(value))]);
         Detectable { effect: s.family(), minimum }
     };
-    losses.detectable(steps, threshold).into_iter().map(least).collect()
+    losses.detectable(steps, threshold).into_iter().map(minimum).collect()
 }
 
 /// A band beside the target.

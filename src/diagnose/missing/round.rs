@@ -22,13 +22,13 @@ impl<'a> Round<'a> {
         views: &'a [Vec<Cell<'a>>],
         explained: &[Vec<f64>],
         (steps, curves): (&[Step], &[Basis]),
-        least: Scatter,
+        min_scatter: Scatter,
         seed: Seed,
     ) -> Option<Self> {
         let ledger = Losses::new(views, explained);
         let (first, _) = ledger.judge(steps, curves, None);
         let all: Vec<usize> = (0..first.len()).collect();
-        let ledger = ledger.scattered_as_left_by(&first[choose(&first, &all)?], least);
+        let ledger = ledger.scattered_as_left_by(&first[choose(&first, &all)?], min_scatter);
         let (judged, noise) = ledger.judge(steps, curves, Some(seed));
         Some(Round { ledger, judged, noise })
     }

@@ -109,12 +109,12 @@ impl<'a> Losses<'a> {
         losses
     }
 
-    /// Once more with the scatter that `best` leaves, and no less than `least`.
-    pub fn scattered_as_left_by(self, best: &Judged, least: Scatter) -> Self {
+    /// Once more with the scatter that `best` leaves, and no less than `min_scatter`.
+    pub fn scattered_as_left_by(self, best: &Judged, min_scatter: Scatter) -> Self {
         let explained = self.explained(best);
         let mut left = self.left.clone();
         left.iter_mut().flatten().zip(explained.iter().flatten()).for_each(|(y, e)| *y -= e);
-        let scatter = Scatter::of(self.views, &left, least);
+        let scatter = Scatter::of(self.views, &left, min_scatter);
         let whiteners = self.views.iter().map(|v| Whitener::of(v, scatter)).collect();
         Losses { whiteners, ..self }
     }

@@ -131,8 +131,8 @@ const MIDDLES: usize = 24;
 const WIDTHS_DEG: [f64; 3] = [1.0, 2.0, 4.0];
 const WIDTHS: [f64; 3] = [0.015, 0.03, 0.06];
 /// Smaller reaches tell nothing of an axis: rad, and share of z.
-const LEAST_TILT: f64 = 0.1;
-const LEAST_RANGE: f64 = 1.1;
+const MIN_TILT: f64 = 0.1;
+const MIN_RANGE: f64 = 1.1;
 
 /// All steps on lawful axes.
 fn steps(reach: &Extent, camera: &Camera) -> Vec<Step> {
@@ -202,8 +202,8 @@ pub fn begun(steps: &[Step], times: impl Iterator<Item = f64>) -> Vec<Step> {
 
 /// Do views that reach so far tell anything of this axis?
 pub fn is_told_apart(axis: Axis, reach: &Extent) -> bool {
-    let ([least, steepest], [near, far]) = (reach.theta, reach.z);
-    if axis == Axis::Theta { steepest - least > LEAST_TILT } else { far > LEAST_RANGE * near }
+    let ([flattest, steepest], [near, far]) = (reach.theta, reach.z);
+    if axis == Axis::Theta { steepest - flattest > MIN_TILT } else { far > MIN_RANGE * near }
 }
 
 /// Curves without a name.

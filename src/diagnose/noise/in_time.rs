@@ -10,7 +10,7 @@ use crate::terms::{Axis, Statistic};
 /// Pixels that err by a constant each.
 pub const FIXED_PATTERN: &str = "fixed-pattern-noise";
 /// Share of the variance that pixels repeat in every view, worth a word.
-const LEAST_FIXED: f64 = 0.0003;
+const MIN_FIXED: f64 = 0.0003;
 /// Below this chance a fall of the correlation is not put down to noise alone.
 const DOUBTFUL: f64 = 0.05;
 /// A share that stands still beside one that changes slowly is known to this.
@@ -45,7 +45,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
         statistic: Statistic::Bias,
         axis: Axis::Pixel,
         expected_px2: known_px * known_px,
-        least: LEAST_FIXED,
+        min_share: MIN_FIXED,
         words: None,
     };
     let mut found: Vec<TextureFinding> =
@@ -88,8 +88,8 @@ fn beside(
     let slowly = alike && p_falling < level;
     // What stands still is in the last of them whole, and in all of them where none fades.
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
-    let Some(least) = ViewMean::of(views, last).map(sure_of) else { return found };
-    let p_still = least.p_above(frozen_known);
+    let Some(standing) = ViewMean::of(views, last).map(sure_of) else { return found };
+    let p_still = standing.p_above(frozen_known);
     let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
     let stands = p_still < level && still - frozen_known > floor;
     if slowly && rho_known == 0.0 {
@@ -110,9 +110,9 @@ fn beside(
             }
             true => vec!["temporal-correlation", "frozen-noise"],
         };
-        let evidence = (p_still, nats(&least, frozen_known));
+        let evidence = (p_still, nats(&standing, frozen_known));
         let parameter = match names[0] {
-            "frozen-noise" => ("fraction", still, least.std_error),
+            "frozen-noise" => ("fraction", still, standing.std_error),
             _ => ("rho", (first.value - frozen_known).max(0.0), first_error),
         };
         found.push(of_frames(names, [1.0, 3.0], parameter, still, evidence));

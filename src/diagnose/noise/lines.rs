@@ -11,7 +11,7 @@ use crate::stats::mean;
 use crate::terms::{Axis, Basis, Coordinate, Modulation, Term};
 
 /// Columns and rows of fewer readings over all views are left at nothing.
-const FEWEST_READINGS: f64 = 200.0;
+const MIN_READINGS: f64 = 200.0;
 
 /// What each column, or each row, errs by.
 #[derive(Debug, Clone)]
@@ -93,7 +93,7 @@ fn with_own_share(means: &[f32]) -> Vec<f32> {
 fn of_line(views: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     let (mut sum, mut n) = (0.0, 0.0);
     views.clone().for_each(|(s, k)| (sum, n) = (sum + s, n + k));
-    if n < FEWEST_READINGS {
+    if n < MIN_READINGS {
         return (0.0, 0.0);
     }
     let mean = sum / n;

@@ -200,7 +200,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         statistic,
         axis,
         expected_px2,
-        least: 0.0,
+        min_share: 0.0,
         words,
     };
     let afresh = "each column is shifted as one, afresh in every frame";

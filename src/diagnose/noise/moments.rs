@@ -11,7 +11,7 @@
 //!
 //! is none for Gaussian noise whose size changes little from x to y. A third moment uneven sizes do not make.
 
-use super::tail_counts::{FEWEST_READINGS, patches};
+use super::tail_counts::{MIN_READINGS, patches};
 
 /// Residuals farther out, in standard deviations, are [`super::tails`]' to count: one gross error of 30
 /// would outweigh a million others here.
@@ -103,7 +103,7 @@ impl Moments {
 
     /// Skewness, where enough was looked at.
     pub fn skewness(&self) -> Option<f64> {
-        (self.readings >= FEWEST_READINGS).then(|| self.thirds / self.readings)
+        (self.readings >= MIN_READINGS).then(|| self.thirds / self.readings)
     }
 
     /// Excess kurtosis, where enough was looked at and neighbours share little.
@@ -112,7 +112,7 @@ impl Moments {
         let shared = self.pairs.iter().map(rho).sum::<f64>() / self.pairs.len() as f64;
         let of = |s: &PairSums| {
             let uneven = s.products_of_squares / s.pairs / (1.0 + 2.0 * rho(s).powi(2));
-            (s.pairs >= FEWEST_READINGS && shared < MAX_SHARED)
+            (s.pairs >= MIN_READINGS && shared < MAX_SHARED)
                 .then(|| s.fourth / s.pairs - GAUSSIAN_FOURTH - 3.0 * (uneven - 1.0))
         };
         let all: Option<Vec<f64>> = self.pairs.iter().map(of).collect();

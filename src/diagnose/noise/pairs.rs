@@ -17,7 +17,7 @@ pub const REACH_PX: usize = 4;
 /// Pixels closer than this along a line may share a window, px.
 const APART_PX: usize = 16;
 /// Fewer pairs say nothing.
-const FEWEST_PAIRS: f64 = 1000.0;
+const MIN_PAIRS: f64 = 1000.0;
 
 /// Mean products, px^2.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +40,7 @@ impl Pairs {
         let pixels = level.iter().filter(|r| r.is_finite()).count() as f64;
         let power = mean(level.iter().map(|r| f64::from(*r).powi(2)))?;
         let beside = neighbours(&level, width);
-        if beside.pairs < FEWEST_PAIRS {
+        if beside.pairs < MIN_PAIRS {
             return None;
         }
         // The plane took a little of every product with it: the noise of as many pixels as hang together
@@ -54,7 +54,7 @@ impl Pairs {
                 sum = sum.and(along(pixels.clone().map(|i| f64::from(level[i]))));
                 leverage += plane.leverage_along(&level, pixels);
             }
-            (sum.pairs >= FEWEST_PAIRS).then(|| (sum.products + taken * leverage) / sum.pairs)
+            (sum.pairs >= MIN_PAIRS).then(|| (sum.products + taken * leverage) / sum.pairs)
         };
         let row = lines(height, width, &|line, k| line * width + k);
         let column = lines(width, height, &|line, k| k * width + line);

@@ -9,7 +9,7 @@ use crate::terms::{Axis, Statistic};
 
 /// Less is no news: what bends the disparity a little, as a window that averages over depths does, makes as much as
 /// the step from disparity to depth, which is .05 for a Kinect at 4 m (6 times its relative sigma).
-const LEAST: f64 = 0.05;
+const MIN_SKEWNESS: f64 = 0.05;
 
 /// Of all views or of some, in the disparity and in the depth alike: noise that is symmetric in one of them is skewed
 /// in the other.
@@ -24,11 +24,11 @@ fn to_side(views: &[Structure], sign: f64, level: f64) -> Option<TextureFinding>
     let m = ViewMean::of(views, of)?;
     // Two sides, and of each all views and some.
     let p = 4.0 * m.p_above(0.0);
-    if m.value >= LEAST && p <= level {
+    if m.value >= MIN_SKEWNESS && p <= level {
         return Some(found(&m, sign, p));
     }
     let some = some_views(views, of).filter(|some| 4.0 * some.p <= level)?;
-    let m = ViewMean::of(&some.views, of).filter(|m| m.value >= LEAST)?;
+    let m = ViewMean::of(&some.views, of).filter(|m| m.value >= MIN_SKEWNESS)?;
     Some(found(&m, sign, 4.0 * some.p).of_some([some.views.len(), some.of], 4.0 * some.p))
 }
 

@@ -7,16 +7,16 @@ use super::view_mean::Weight;
 use crate::stats::{at_least, normal_beyond, student_upper};
 
 /// Fewer views than this, and than this share of all, are odd ones.
-const FEWEST: usize = 3;
-const FEWEST_SHARE: f64 = 0.2;
+const MIN_VIEWS: usize = 3;
+const MIN_SHARE: f64 = 0.2;
 /// Fewer views below what is expected do not tell how far views scatter: with two, half of it is chance.
-const FEWEST_BELOW: usize = 3;
+const MIN_BELOW: usize = 3;
 /// A view beyond the fewest is one of them where as far above is this improbable.
 const CLEAR: f64 = 0.01;
 
 /// How many views are more than odd ones.
-pub fn fewest(views: usize) -> usize {
-    FEWEST.max((FEWEST_SHARE * views as f64).ceil() as usize)
+pub fn min_views(views: usize) -> usize {
+    MIN_VIEWS.max((MIN_SHARE * views as f64).ceil() as usize)
 }
 
 /// Views that lie above the others, by their numbers, and the chance that so many lie so far.
@@ -32,7 +32,7 @@ impl SomeViews {
         let below = || off.iter().filter(|t| **t < 0.0);
         let n = below().count();
         let scale = (below().map(|t| t * t).sum::<f64>() / n as f64).sqrt();
-        (n >= FEWEST_BELOW && scale > 0.0).then(|| SomeViews::beyond(off, scale, n))?
+        (n >= MIN_BELOW && scale > 0.0).then(|| SomeViews::beyond(off, scale, n))?
     }
 
     /// Of what each view is off by, which is known to err by `scale`, as `freedom` values tell.
@@ -40,11 +40,11 @@ impl SomeViews {
         let above = |v: &usize| off[*v] > 0.0;
         let mut which: Vec<usize> = (0..off.len()).filter(above).collect();
         which.sort_by(|a, b| off[*b].total_cmp(&off[*a]));
-        let (least, n) = (fewest(off.len()), which.len());
-        let p = order_statistic(off[*which.get(least - 1)?] / scale, least, n, freedom);
+        let (min, n) = (min_views(off.len()), which.len());
+        let p = order_statistic(off[*which.get(min - 1)?] / scale, min, n, freedom);
         let sure = |v: &&usize| student_upper(off[**v] / scale, freedom as f64) < CLEAR;
         let clear = which.iter().filter(sure).count();
-        which.truncate(clear.max(least));
+        which.truncate(clear.max(min));
         which.sort_unstable();
         Some(SomeViews { which, p })
     }

@@ -67,11 +67,11 @@ fn covariances(
         [pixels, blotches, columns, rows]
     };
     let all: Vec<[Vec<f32>; 4]> = views.par_iter().map(of_view).collect();
-    let of = |k: usize, fewest| {
-        across_views(&all.iter().map(|view| &view[k][..]).collect::<Vec<_>>(), fewest)
+    let of = |k: usize, min_pairs| {
+        across_views(&all.iter().map(|view| &view[k][..]).collect::<Vec<_>>(), min_pairs)
     };
-    let [pixels, blotches] = [0, 1].map(|k| of(k, FEWEST_PAIRS[0]));
-    let [columns, rows] = [2, 3].map(|k| of(k, FEWEST_PAIRS[1]));
+    let [pixels, blotches] = [0, 1].map(|k| of(k, MIN_PAIRS[0]));
+    let [columns, rows] = [2, 3].map(|k| of(k, MIN_PAIRS[1]));
     let still = |v: usize| Still {
         fixed_px2: pixels[v],
         blotches_px2: blotches[v],
@@ -81,7 +81,7 @@ fn covariances(
 }
 
 /// Of fewer pixels, and of fewer lines, that another view saw as well nothing is told.
-const FEWEST_PAIRS: [f64; 2] = [1000.0, 100.0];
+const MIN_PAIRS: [f64; 2] = [1000.0, 100.0];
 
 /// What the mean of each column, and of each row, has beyond the mean of its neighbours'; NaN where one of
 /// them is short. What is smooth, as leftovers of shapes are, is not in it; lines that err independently
@@ -108,7 +108,7 @@ fn tossed(field: &Field, coins: &[f32]) -> Vec<f32> {
 }
 
 /// Mean product of each view's values with the mean of the others', px^2.
-fn across_views(means: &[&[f32]], fewest: f64) -> Vec<Option<f64>> {
+fn across_views(means: &[&[f32]], min_pairs: f64) -> Vec<Option<f64>> {
     let n = means.iter().map(|image| image.len()).max().unwrap_or(0);
     let mut sum = vec![0f32; n];
     let mut count = vec![0u16; n];
@@ -130,7 +130,7 @@ fn across_views(means: &[&[f32]], fewest: f64) -> Vec<Option<f64>> {
                 n += others;
             }
         }
-        (n > fewest).then(|| products / n)
+        (n > min_pairs).then(|| products / n)
     };
     means.par_iter().map(of).collect()
 }

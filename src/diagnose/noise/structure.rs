@@ -8,7 +8,7 @@ use super::frame_series::{Jitter, Squares};
 use super::moments::Moments;
 use super::pairs::{Pairs, REACH_PX};
 use super::still::{KeptPattern, beside_bias, still};
-use super::tail_counts::{FEWEST_READINGS, TailCounts};
+use super::tail_counts::{MIN_READINGS, TailCounts};
 use super::texture::{
     FAR, Filled, PROFILE_LAGS, SHORT_LINE, area, changes, covariance, frame_log_variance,
     high_passed, moving, same_pixel, without_lines, without_outliers,
@@ -63,7 +63,7 @@ pub struct Structure {
 impl Structure {
     /// Share beyond four local standard deviations, where enough was looked at.
     pub fn tail_share(&self) -> Option<f64> {
-        (self.tails.n > FEWEST_READINGS).then(|| self.tails.share())
+        (self.tails.n > MIN_READINGS).then(|| self.tails.share())
     }
 
     /// Excess kurtosis of the disparity, and of the depth: of an error e of the disparity d that is e / (1 + e / d), to

@@ -6,7 +6,7 @@ use crate::stats::{MAD_TO_SIGMA, median_in_place};
 pub const GAUSSIAN_TAIL: f64 = 6.334e-5;
 const TAIL_SIGMAS: f32 = 4.0;
 /// Views too small to show a tail, in readings.
-pub const FEWEST_READINGS: f64 = 5000.0;
+pub const MIN_READINGS: f64 = 5000.0;
 /// What lies beyond the last is no tail of the noise: a few such errors would decide its mean.
 pub const TAIL_EDGES: [f64; 6] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0];
 

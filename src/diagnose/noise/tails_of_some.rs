@@ -2,9 +2,9 @@
 
 use statrs::distribution::{DiscreteCDF, Poisson};
 
-use super::some_views::fewest;
+use super::some_views::min_views;
 use super::structure::Structure;
-use super::tail_counts::{FEWEST_READINGS, TAIL_EDGES};
+use super::tail_counts::{MIN_READINGS, TAIL_EDGES};
 use crate::stats::{at_least, normal_beyond};
 
 /// A view has tails where as many are this improbable.
@@ -20,12 +20,12 @@ pub struct TailedViews {
 /// The views whose share beyond four sigma is above `heavy`, if they are more than odd ones. By the noise alone
 /// a share of up to `expected` is.
 pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<TailedViews> {
-    let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > FEWEST_READINGS).collect();
+    let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > MIN_READINGS).collect();
     let tailed = |s: &&&Structure| {
         s.tails.share() > heavy * bent(s) && chance(s, expected).is_some_and(|p| p < CLEAR)
     };
     let tailed: Vec<Structure> = looked.iter().filter(tailed).map(|s| (*s).clone()).collect();
-    if tailed.len() < fewest(looked.len()) {
+    if tailed.len() < min_views(looked.len()) {
         return None;
     }
     Some(TailedViews { views: tailed, p: order_statistic(&looked, expected)? })
@@ -55,9 +55,9 @@ fn order_statistic(views: &[&Structure], expected: f64) -> Option<f64> {
     let all = views.iter().filter_map(|s| chance(s, expected));
     let mut chances: Vec<f64> = all.collect();
     chances.sort_by(f64::total_cmp);
-    let fewest = fewest(views.len());
-    let p = chances.get(fewest - 1)?.clamp(0.0, 1.0);
-    Some(at_least(fewest, chances.len(), p).max(1e-300))
+    let min_views = min_views(views.len());
+    let p = chances.get(min_views - 1)?.clamp(0.0, 1.0);
+    Some(at_least(min_views, chances.len(), p).max(1e-300))
 }
 
 #[cfg(test)]

@@ -103,9 +103,9 @@ pub fn line_sums(image: &[f32], width: usize, axis: Axis) -> Vec<(f64, f64)> {
 }
 
 /// Minus the mean of each long row and column: noise that a row shares is no window's.
-pub fn without_lines(image: &[f32], width: usize, least: f64) -> Vec<f32> {
+pub fn without_lines(image: &[f32], width: usize, min_pixels: f64) -> Vec<f32> {
     let mut out = image.to_vec();
-    let level = |(sum, n): (f64, f64)| if n >= least { (sum / n) as f32 } else { 0.0 };
+    let level = |(sum, n): (f64, f64)| if n >= min_pixels { (sum / n) as f32 } else { 0.0 };
     for axis in [Axis::Row, Axis::Column] {
         let levels: Vec<f32> = line_sums(&out, width, axis).into_iter().map(level).collect();
         let pixels = out.iter_mut().enumerate();
@@ -122,8 +122,8 @@ const LARGE_SHARE: f64 = 0.25;
 /// these `shares` of the variance: theirs stand in the correlation at every lag, and are no window's.
 pub fn area(noise: &[f32], width: usize, shares: [f64; 2]) -> f64 {
     let is_large = shares.iter().any(|share| *share > LARGE_SHARE);
-    let (least, shares) = if is_large { (SHORT_LINE, [0.0; 2]) } else { (LONG_LINE, shares) };
-    let correlation = measure_correlation(&without_lines(noise, width, least), width);
+    let (min_pixels, shares) = if is_large { (SHORT_LINE, [0.0; 2]) } else { (LONG_LINE, shares) };
+    let correlation = measure_correlation(&without_lines(noise, width, min_pixels), width);
     // A box of L px has a correlation sum of L along each axis.
     let along = |by_lag: &[f64], share: f64| {
         let left = |rho: &f64| ((rho - share) / (1.0 - share).max(0.1)).max(0.0);

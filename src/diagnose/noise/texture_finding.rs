@@ -78,7 +78,7 @@ pub struct Shared {
     /// What the model has of it, px^2.
     pub expected_px2: f64,
     /// Of all variance: a smaller share is not worth a word.
-    pub least: f64,
+    pub min_share: f64,
     pub words: Option<&'static str>,
 }
 
@@ -88,7 +88,7 @@ impl Shared {
         let p = m.p_above(self.expected_px2);
         let share = (m.value - self.expected_px2) / variance_px2.max(1e-12);
         let sigma = m.value.max(0.0).sqrt();
-        (p < level && share > self.least).then(|| TextureFinding {
+        (p < level && share > self.min_share).then(|| TextureFinding {
             parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
             size_sigma: share.sqrt(),
             p,

@@ -42,7 +42,7 @@ use trial::{Trial, nests};
 
 /// A later term must bring this share of what the first brought: what is less is the first one's
 /// own shape, badly met.
-pub const LEAST_SHARE_OF_GAIN: f64 = 0.005;
+pub const MIN_SHARE_OF_GAIN: f64 = 0.005;
 
 /// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
 /// within them. A term `beside` is fitted with every other, whatever it brings: what it can take up is
@@ -59,8 +59,7 @@ pub fn search(
     let mut chosen: Vec<Chosen> = Vec::new();
     layer.pinned = beside.map(|candidate| layer.pin(candidate));
     while let Some(next) = layer.step(&chosen) {
-        let little =
-            chosen.first().is_some_and(|first| next.gain < LEAST_SHARE_OF_GAIN * first.gain);
+        let little = chosen.first().is_some_and(|first| next.gain < MIN_SHARE_OF_GAIN * first.gain);
         if little || chosen.len() >= rules.max_terms {
             break;
         }

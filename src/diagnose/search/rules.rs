@@ -4,7 +4,7 @@ use crate::diagnose::views::learnt::Learnt;
 use crate::terms::Basis;
 
 /// A later term must be this large beside the largest, root mean square by root mean square.
-const LEAST_OF_LARGEST: f64 = 0.06;
+const MIN_OF_LARGEST: f64 = 0.06;
 /// A pattern that stands still must be, in square, so much more than what a fit to nothing but the
 /// pixels' own errors would make: seven times, for the best of many and for views that cover little
 /// of the picture.
@@ -43,6 +43,6 @@ impl Rules {
             fixed * (CLEARLY_FIXED * basis.count() as f64 / pixels).sqrt()
         };
         let still = self.fixed.filter(|_| basis.is_of_picture()).map_or(0.0, still);
-        still.max(LEAST_OF_LARGEST * largest)
+        still.max(MIN_OF_LARGEST * largest)
     }
 }

@@ -28,7 +28,7 @@ pub struct Quantisation {
 }
 
 /// Fewer distinct words than this make no lattice.
-const FEWEST_WORDS: usize = 12;
+const MIN_WORDS: usize = 12;
 /// Neighbouring words that alternate between crowded and empty by this share.
 const CONTRAST: f64 = 0.4;
 /// Phases gathered less than this belong to none: a dozen words by chance gather so much.
@@ -69,7 +69,7 @@ impl RawHistogram {
     /// The lattice the words lie on.
     pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Quantisation {
         let words = self.occurring();
-        if words.len() < FEWEST_WORDS {
+        if words.len() < MIN_WORDS {
             return Quantisation::default();
         }
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
@@ -121,7 +121,7 @@ impl RawHistogram {
         };
         let words: Vec<(f64, f64)> = self.occurring().iter().filter_map(fine).collect();
         let range = crate::stats::range(words.iter().map(|w| w.0));
-        if words.len() < FEWEST_WORDS || range[1] - range[0] < step {
+        if words.len() < MIN_WORDS || range[1] - range[0] < step {
             return None;
         }
         let cycles = (range[1] - range[0]) / step;
@@ -146,7 +146,7 @@ impl RawHistogram {
                 all += n;
             }
         }
-        (words.len() >= FEWEST_WORDS && all > 0.0).then_some(multiples > 0.5 * all)
+        (words.len() >= MIN_WORDS && all > 0.0).then_some(multiples > 0.5 * all)
     }
 
     /// How much neighbouring words differ in number, 0 (smooth) to 1 (every other one empty).

@@ -12,7 +12,7 @@ use crate::terms::DARKEST;
 /// Widest side of a block, in tiles: 24 px, seven independent samples under a Kinect's window.
 pub const BLOCK_TILES: usize = 6;
 /// The least: narrower ones have hardly a pixel without the rim of a tile.
-const LEAST_TILES: usize = 2;
+const MIN_TILES: usize = 2;
 /// In most views half a block is worth this many samples: beyond -1/n the mean of log chi squared is
 /// off by a five hundredth of its standard deviation then.
 const WORTH: f64 = 24.0;
@@ -26,9 +26,9 @@ pub fn block_tiles(views: &[SurveyedView], width: usize) -> usize {
     let per_px = median(&mut per_px);
     let large = |tiles: &usize| {
         let pixels = ((tiles * SIDE) as f64).powi(2);
-        tiles * WIDTH_PX >= BLOCK_TILES * width && LEAST * pixels * per_px >= WORTH
+        tiles * WIDTH_PX >= BLOCK_TILES * width && MIN_FILLED * pixels * per_px >= WORTH
     };
-    (LEAST_TILES..BLOCK_TILES).find(large).unwrap_or(BLOCK_TILES)
+    (MIN_TILES..BLOCK_TILES).find(large).unwrap_or(BLOCK_TILES)
 }
 
 /// Logarithm of the variance over the model's in patches large enough for a variance, beside a level of
@@ -39,7 +39,7 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
     let side = (tiles * SIDE) as f64;
     let first = view.places.first().map_or(1.0, |p| p.light);
     let lit = by_light && view.places.iter().any(|p| p.light != first);
-    let least = if lit { LEAST_LIT } else { LEAST } * side * side;
+    let min = if lit { MIN_LIT } else { MIN_FILLED } * side * side;
     // With frames to compare, only what changes is noise; its still part is put back by what frames have in
     // common.
     let noise = |i: usize| match (&view.tiles[i], view.between_frame_factor) {
@@ -60,7 +60,7 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
         };
         let (n, repeated) = (sum(&|_| 1.0), sum(&|i| noise(i).1));
         let ratio = sum(&|i| noise(i).1 * noise(i).0 / view.tiles[i].noise_variance);
-        if n < least || ratio <= 0.0 {
+        if n < min || ratio <= 0.0 {
             continue;
         }
         let worth = repeated * view.frames / view.correlation.sum_of_squares;
@@ -78,9 +78,9 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
 }
 
 /// Share of a block that is needed: a few pixels at the rim give no variance.
-const LEAST: f64 = 0.5;
+const MIN_FILLED: f64 = 0.5;
 /// The same where a block falls into parts by their light.
-const LEAST_LIT: f64 = 0.125;
+const MIN_LIT: f64 = 0.125;
 
 #[cfg(test)]
 mod tests {

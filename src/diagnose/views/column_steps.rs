@@ -13,7 +13,7 @@ use crate::stats::{median, range};
 use crate::terms::{Axis, Statistic};
 
 /// Even where all views agree the firmware was free to do otherwise.
-const LEAST_SPREAD: f64 = 1.01;
+const MIN_SPREAD: f64 = 1.01;
 const BANDING: &str = "column-banding";
 /// A step is one of the read-out's: that is known to the scale of the disparity (0.6 % off on a Kinect).
 const STEP_ERROR: f64 = 0.01;
@@ -48,7 +48,7 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
     let std_error = period_px * logs.std_dev() / (seen.len() as f64).sqrt();
     parameters.insert("period_px".into(), estimate(period_px, std_error));
     // The largest over the smallest: how many views there are decides it.
-    parameters.insert("spread".into(), estimate((longest / shortest).max(LEAST_SPREAD), f64::NAN));
+    parameters.insert("spread".into(), estimate((longest / shortest).max(MIN_SPREAD), f64::NAN));
     let plain = named(BANDING, Statistic::Bias, Axis::Column);
     Some(Finding {
         interval: [0.0, fields[0].width as f64],

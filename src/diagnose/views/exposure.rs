@@ -13,7 +13,7 @@ use crate::stats::{MAD_TO_SIGMA, median_in_place};
 use crate::terms::Term;
 
 /// Disparities that spread less than this over a view show no slope, px.
-const LEAST_SPREAD_PX: f64 = 0.5;
+const MIN_SPREAD_PX: f64 = 0.5;
 /// A model that is right spreads residuals as the view itself does, to a few per cent.
 const FAR_OFF: f32 = 2.0;
 
@@ -151,7 +151,7 @@ impl Field {
         }
         // A frontal view has one disparity, and no slope.
         let spread = sxx - sx * sx / f64::max(n, 1.0);
-        let slope = if spread > n * LEAST_SPREAD_PX * LEAST_SPREAD_PX {
+        let slope = if spread > n * MIN_SPREAD_PX * MIN_SPREAD_PX {
             (sxy - sx * sum / n) / spread
         } else {
             0.0

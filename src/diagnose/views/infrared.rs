@@ -42,8 +42,8 @@ pub fn amplitudes(view: &View, on_target: &[bool], width: usize) -> Option<Vec<f
     let apart = pixels().zip(&medians).map(|(i, m)| (f32::from(first.amplitude[i]) - m).abs());
     let noise = MAD_TO_SIGMA * f64::from(median_in_place(&mut apart.collect::<Vec<f32>>()));
     let readings = ((2 * LIGHT_REACH + 1).pow(2) * images.len()) as f64;
-    let least = (SURE_LIGHT_ERRORS * MEDIAN_ERROR * noise / readings.sqrt()) as f32;
-    Some(medians.into_iter().map(|m| m.max(least)).collect())
+    let min = (SURE_LIGHT_ERRORS * MEDIAN_ERROR * noise / readings.sqrt()) as f32;
+    Some(medians.into_iter().map(|m| m.max(min)).collect())
 }
 
 #[cfg(test)]

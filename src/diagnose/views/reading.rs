@@ -9,7 +9,7 @@ use crate::Progress;
 use crate::diagnose::diagnosis::Finding;
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::parameters::one;
-use crate::diagnose::options::FEWEST_VIEWS;
+use crate::diagnose::options::MIN_VIEWS;
 use crate::effects::RAY_FOR_DEPTH;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
@@ -61,7 +61,7 @@ impl<'a> LoadedViews<'a> {
             found = Some(ranges(p));
         }
         let copies = without_copies(&mut fields);
-        if fields.len() < FEWEST_VIEWS {
+        if fields.len() < MIN_VIEWS {
             let first = excluded
                 .first()
                 .map_or_else(String::new, |e| format!("; view {}: {}", e.view, e.reason));
@@ -129,7 +129,7 @@ fn as_ranges(
     let mut told = known.clone();
     told.bias.push(range_term());
     let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
-    if fields.len() < FEWEST_VIEWS {
+    if fields.len() < MIN_VIEWS {
         return None;
     }
     let only = |these: &[Field], those: &[Field]| {

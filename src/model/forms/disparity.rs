@@ -34,13 +34,13 @@ impl SigmaForm for Disparity {
             out[0] = r.z_m.powi(4) * per;
             out[1] = per;
         })?;
-        let least = rows.iter().map(|r| r.sigma_m).fold(f64::INFINITY, f64::min);
+        let min_sigma = rows.iter().map(|r| r.sigma_m).fold(f64::INFINITY, f64::min);
         let largest = rows.iter().map(|r| r.sigma_m / (r.z_m * r.z_m)).fold(0.0, f64::max);
         let k = squares[0].max(0.0).sqrt().max(1e-3 * largest);
         let no_floor = squares[1] <= 0.0;
         let held = "no floor s0 shows in the data; it is held at a hundredth of the least sigma";
         Some(Start {
-            parameters: vec![k, if no_floor { 1e-2 * least } else { squares[1].sqrt() }],
+            parameters: vec![k, if no_floor { 1e-2 * min_sigma } else { squares[1].sqrt() }],
             held: vec![false, no_floor],
             remarks: no_floor.then(|| held.into()).into_iter().collect(),
         })

@@ -68,8 +68,8 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
 
 /// Do the views differ in tilt at all? If not, the tilt term is one more parabola.
 fn tilts_differ(rows: &Rows) -> bool {
-    let [least, most] = rows.range(|r| r.theta_rad);
-    most - least > ONE_TILT_DEG.to_radians()
+    let [min, max] = rows.range(|r| r.theta_rad);
+    max - min > ONE_TILT_DEG.to_radians()
 }
 
 /// Views this near in tilt have one: so far is a board off that is set up by hand and eye.

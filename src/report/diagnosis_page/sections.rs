@@ -134,9 +134,9 @@ pub(super) fn detectable(diagnosis: &Diagnosis) -> Markup {
     let names: Vec<String> =
         diagnosis.detectable.iter().map(|d| title(d.effect).to_string()).collect();
     let rows = diagnosis.detectable.iter().filter_map(|d| {
-        let (strength, least) = d.minimum.iter().next()?;
+        let (strength, size) = d.minimum.iter().next()?;
         let smallest = html! {
-            (parameters::title(strength)) " " b { (parameters::value(Some(d.effect), strength, least, 2)) }
+            (parameters::title(strength)) " " b { (parameters::value(Some(d.effect), strength, size, 2)) }
             @for (key, value) in d.minimum.iter().skip(1) {
                 ", at a " (parameters::title(key)) " of " (parameters::value(Some(d.effect), key, value, 2))
             }
