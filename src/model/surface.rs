@@ -172,7 +172,7 @@ impl SigmaModel {
     }
 }
 
-/// Bilinear between nodes; outside the model's range its edge holds, as in the model.
+/// [`SigmaModel::axial_sigma`], bilinear between nodes; outside the model's range its edge holds, as in the model.
 #[derive(Debug, Clone)]
 pub struct SigmaLookup {
     domain: Domain,
@@ -195,13 +195,13 @@ impl SigmaLookup {
             let z = z0 + (z1 - z0) * i as f64 / (DEPTHS - 1) as f64;
             for j in 0..TILTS {
                 let left = 1.0 - j as f64 / (TILTS - 1) as f64;
-                nodes.push(model.sigma(z, steepest * (1.0 - left * left)) as f32);
+                nodes.push(model.axial_sigma(z, steepest * (1.0 - left * left)) as f32);
             }
         }
         SigmaLookup { domain, nodes }
     }
 
-    /// Sigma, m, at depth `z` (m) and tilt `theta` (rad).
+    /// Standard deviation of depth, m, at depth `z` (m) and tilt `theta` (rad).
     #[inline]
     pub fn at(&self, z: f32, theta: f32) -> f32 {
         let [z0, z1] = self.domain.z_m.map(|v| v as f32);
@@ -275,13 +275,14 @@ mod tests {
 
     #[test]
     fn the_table_is_the_model_inside_its_range_and_at_its_edge() {
-        for model in [SigmaModel::paper(), SigmaModel::nguyen(), SigmaModel::khoshelham()] {
+        let across = SigmaModel { direction: Direction::Perpendicular, ..SigmaModel::paper() };
+        for model in [SigmaModel::paper(), SigmaModel::nguyen(), SigmaModel::khoshelham(), across] {
             let table = SigmaLookup::of(&model);
             for i in 0..=60 {
                 for j in 0..=157 {
                     let (z, theta) = (0.1 * f64::from(i), 0.01 * f64::from(j));
                     let (found, truth) =
-                        (f64::from(table.at(z as f32, theta as f32)), model.sigma(z, theta));
+                        (f64::from(table.at(z as f32, theta as f32)), model.axial_sigma(z, theta));
                     assert!((found / truth - 1.0).abs() < 0.01, "{z} {theta}: {found} {truth}");
                 }
                 let z = 0.1 * i as f32;
