@@ -1,11 +1,11 @@
 //! Frames whose means move or jitter as the pixels' noise does not explain.
 
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::frame_series::{Excess, Jitter, Squares};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
-use super::view_mean::{ViewMean, variance_px2};
+use super::view_mean::variance_px2;
 use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
@@ -16,24 +16,42 @@ const UNEVEN: f64 = 0.2;
 /// Frames that shift as a whole.
 const JITTERS: &str = "frame-jitter";
 
-/// The velocity along the optical axis, m/s, of a target that moves alike in all views, where three or more tell.
-fn steady(all: &[Jitter], noise: &FrameNoise) -> Option<ViewMean> {
-    let precision = |j: &Jitter| j.trend_px2 / (j.velocity_mps.powi(2) * noise.px2(j));
-    let moved = all.iter().filter(|j| j.trend_px2 > 0.0);
-    let known: Vec<(f64, f64)> = moved.map(|j| (j.velocity_mps, precision(j))).collect();
-    ViewMean::weighed(&known).filter(|m| m.views >= 3.0)
+/// A target that moves by the same velocity in all views.
+struct Motion {
+    /// Along the optical axis, m/s.
+    velocity_mps: f64,
+    std_error: f64,
+    p: f64,
 }
 
-/// Chance of such a velocity, or of one the other way, for a target at rest.
-fn chance(velocity: &ViewMean) -> f64 {
-    2.0 * velocity.p_above(0.0).min(velocity.p_below(0.0))
+impl Motion {
+    /// Mean of the views' velocities by their errors, which are enlarged by how they disagree.
+    fn of(all: &[Jitter], noise: &FrameNoise) -> Option<Self> {
+        let known: Vec<(f64, f64)> = all
+            .iter()
+            .filter(|j| j.trend_px2 > 0.0 && j.freedom > 0.0)
+            .map(|j| (j.velocity_mps, j.velocity_mps.powi(2) / j.trend_px2 * noise.own_px2(j)))
+            .filter(|(_, variance)| *variance > 0.0)
+            .collect();
+        let n = known.len() as f64;
+        let precision: f64 = known.iter().map(|v| 1.0 / v.1).sum();
+        if known.len() < 3 || !precision.is_finite() {
+            return None;
+        }
+        let velocity_mps = known.iter().map(|v| v.0 / v.1).sum::<f64>() / precision;
+        let left: f64 = known.iter().map(|v| (v.0 - velocity_mps).powi(2) / v.1).sum();
+        let std_error = ((left / (n - 1.0)).max(1.0) / precision).sqrt();
+        let t = velocity_mps / std_error;
+        let p = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |d| 2.0 * d.sf(t.abs()));
+        Some(Motion { velocity_mps, std_error, p })
+    }
 }
 
 /// The velocity of a target that seems to move, its error, m/s, and the chance of it for one at rest.
 pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f64)> {
     let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
-    let m = steady(&all, &FrameNoise::of(&all))?;
-    Some((m.value, m.std_error.hypot(UNEVEN * m.value), chance(&m)))
+    let Motion { velocity_mps, std_error, p } = Motion::of(&all, &FrameNoise::of(&all))?;
+    Some((velocity_mps, std_error.hypot(UNEVEN * velocity_mps), p))
 }
 
 /// Noise of a frame's mean about the line of its view.
@@ -42,17 +60,43 @@ struct FrameNoise {
     freedom: f64,
     /// What all frames scatter by beside what their pixels explain, px^2; negative where they scatter less.
     extra_px2: f64,
+    /// Squared coefficient of variation of the views' own variances about that, beyond chance.
+    cv2: f64,
 }
 
 impl FrameNoise {
     fn of(all: &[Jitter]) -> Self {
         let freedom: f64 = all.iter().map(|j| j.freedom).sum();
         let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
-        FrameNoise { freedom, extra_px2: beside / freedom }
+        let mut noise = FrameNoise { freedom, extra_px2: beside / freedom, cv2: 0.0 };
+        // Of r, a ratio with f degrees of freedom, (r - 1)^2 is cv2 (1 + 2 / f) + 2 / f on average.
+        let off = |j: &Jitter| {
+            let by_chance = 2.0 / j.freedom;
+            ((noise.ratio(j) - 1.0).powi(2) - by_chance) / (1.0 + by_chance)
+        };
+        let measured = all.iter().filter(|j| j.freedom > 0.0 && noise.px2(j) > f64::MIN_POSITIVE);
+        let (sum, n) = measured.fold((0.0, 0.0), |(sum, n), j| (sum + off(j), n + 1.0));
+        noise.cv2 = (sum / f64::max(n, 1.0)).max(0.0);
+        noise
+    }
+
+    /// What a view's own frames scatter by, over what is expected.
+    fn ratio(&self, view: &Jitter) -> f64 {
+        view.scatter_px2 / (view.freedom * self.px2(view))
     }
 
     fn px2(&self, view: &Jitter) -> f64 {
         (view.expected_px2 + self.extra_px2.max(0.0)).max(f64::MIN_POSITIVE)
+    }
+
+    /// As its own frames scatter, so far as views differ (a moderated variance: Smyth 2004, his prior by
+    /// its moments); no less than all do, for few frames may lie on a line by chance.
+    fn own_px2(&self, view: &Jitter) -> f64 {
+        // Inverse gamma variances of d degrees of freedom have cv2 = 2 / (d - 4), and their mean counts
+        // d - 2 times.
+        let others = 2.0 * (1.0 + self.cv2);
+        let own = self.cv2 * view.freedom;
+        self.px2(view) * ((others + own * self.ratio(view)) / (others + own)).max(1.0)
     }
 }
 
@@ -97,15 +141,17 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
     let f = line / (about_it * wander * wander);
     let p_line = FisherSnedecor::new(n, noise.freedom).map_or(1.0, |d| d.sf(f));
-    let steady = steady(all, noise).filter(|m| chance(m) < 0.5 * level);
+    let steady = Motion::of(all, noise).filter(|m| m.p < 0.5 * level);
     if steady.is_none() && !(p_line < 0.5 * level && f > 3.0) {
         return None;
     }
     let speed = (all.iter().map(|j| j.velocity_mps.powi(2)).sum::<f64>() / n).sqrt();
     let signed = all.iter().map(|j| j.velocity_mps).sum::<f64>() / n;
-    let by_line = (speed.copysign(signed), speed / (2.0 * n).sqrt(), p_line);
-    let (velocity_mps, std_error, p) =
-        steady.map_or(by_line, |m| (m.value, m.std_error, chance(&m)));
+    let Motion { velocity_mps, std_error, p } = steady.unwrap_or(Motion {
+        velocity_mps: speed.copysign(signed),
+        std_error: speed / (2.0 * n).sqrt(),
+        p: p_line,
+    });
     let std_error = std_error.hypot(UNEVEN * velocity_mps);
     Some(TextureFinding {
         parameters: one("velocity_mps", velocity_mps, std_error),
@@ -193,6 +239,29 @@ mod tests {
         let moving = (0..300).filter(|seed| told(*seed, 0.0)).count();
         assert!(moving <= 3, "{moving} of 300 move");
         assert!((0..20).all(|seed| told(seed, 0.05)));
+    }
+
+    /// Views that scatter alike are believed to: by each one's own two degrees of freedom, if that is more,
+    /// they would scatter by 1 + 1/e. A view that is truly restless is taken for it.
+    #[test]
+    fn a_view_counts_by_its_own_frames_as_far_as_views_differ() {
+        let mut rng = Seed(11).stream("frame-means/moderated");
+        let mut view = |true_px2: f64, freedom: u32| {
+            let scatter_px2 = (0..freedom).map(|_| true_px2 * normal(&mut rng).powi(2)).sum();
+            let freedom = f64::from(freedom);
+            Jitter { scatter_px2, freedom, expected_px2: 1.0, trend_px2: 1.0, velocity_mps: 1.0 }
+        };
+        let mut over = 0.0;
+        for _ in 0..200 {
+            let all: Vec<Jitter> = (0..13).map(|_| view(1.0, 2)).collect();
+            let noise = FrameNoise::of(&all);
+            over += all.iter().map(|j| noise.own_px2(j) / noise.px2(j)).sum::<f64>() / 2600.0;
+        }
+        assert!((1.0..1.2).contains(&over), "{over}");
+        let all: Vec<Jitter> = (0..40).map(|v| view(if v == 7 { 30.0 } else { 1.0 }, 10)).collect();
+        let noise = FrameNoise::of(&all);
+        let own = noise.own_px2(&all[7]);
+        assert!((15.0..60.0).contains(&own), "{own}");
     }
 
     /// Far, steep views have noisy means: a motion that the near ones see is no less sure for them.
