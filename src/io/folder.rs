@@ -24,23 +24,26 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
     let (remarks, described_by) = (list.remarks, vec![path.clone()]);
     let sensor = || assumed.sequence_sensor(&path, size_of(first)?);
     let film = Footage { remarks, described_by, ..Footage::default() };
-    let (film, sensor) = film.described(root, sensor)?;
+    let (film, sensor) = film.described(root, assumed, sensor)?;
     Ok((Footage { frames: list.frames, ..film }, sensor))
 }
 
 impl Footage {
-    /// With the sensor by the recording.json in `root`, else by what is `assumed`, and remarks on either.
+    /// With the sensor by the recording.json in `root`, beside which nothing may be `assumed`, else `by_options`;
+    /// and remarks on either.
     fn described(
         mut self,
         root: &Path,
-        assumed: impl FnOnce() -> Result<(Sensor, Option<String>)>,
+        assumed: &Assumed,
+        by_options: impl FnOnce() -> Result<(Sensor, Option<String>)>,
     ) -> Result<(Self, Sensor)> {
         let description = root.join(DESCRIPTION);
         if !is_there(&description)? {
-            let (sensor, remark) = assumed()?;
+            let (sensor, remark) = by_options()?;
             self.remarks.extend(remark);
             return Ok((self, sensor));
         }
+        assumed.refuse_beside(&description)?;
         let mut unknown = UnknownKeys::default();
         let sensor = read_sensor(&description, &mut unknown)?;
         self.remarks.extend(unknown.remarks());
@@ -85,12 +88,8 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
         .enumerate()
         .map(|(i, path)| FrameRef::file(i as f64 * NOMINAL_INTERVAL_S, path));
     let frames: Vec<FrameRef> = stamped.collect();
-    let description = root.join(DESCRIPTION);
-    if is_there(&description)? {
-        assumed.refuse_beside(&description)?;
-    }
     let film = Footage { film: Film::Captures, remarks, ..Footage::default() };
-    let (film, sensor) = film.described(root, || assumed.images_sensor(root, &frames))?;
+    let (film, sensor) = film.described(root, assumed, || assumed.images_sensor(root, &frames))?;
     Ok((Footage { frames, ..film }, sensor))
 }
 

@@ -410,6 +410,12 @@ fn options_of_a_film_are_told_without_one() {
         let line = format!("simulate out --shrink 8 --distances 1 --tilts 0 {option}");
         desk.refused(&line, &[&option[..8], "give --room too"]);
     }
+    desk.film("film", 2);
+    for option in ["--intrinsics 145,145,79.5,59.5", "--units-per-metre 1000", "--baseline 0.08"] {
+        let name = option.split(' ').next().expect("a name");
+        let says = [name, "recording.json", "leave the option out"];
+        desk.refused(&format!("map film -o out {option}"), &says);
+    }
     let dark = "--room --shrink 8 --frames 2 --physics speckle --cause light=0";
     desk.refused(&format!("simulate out {dark}"), &["no frame shows any depth"]);
     let light = "--shrink 8 --distances 1 --tilts 0 --physics speckle --cause light=1e9";
