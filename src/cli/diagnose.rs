@@ -181,7 +181,7 @@ fn summary(diagnosis: &Diagnosis) -> String {
     let mut text = match diagnosis.verdict {
         Verdict::Match => format!("match: nothing was found that the {it} leaves out\n"),
         Verdict::Inconclusive => {
-            "inconclusive: nothing was found, and not everything could be tested\n".to_string()
+            "inconclusive: nothing was found, and these views do not settle whether there is something\n".to_string()
         }
         Verdict::Mismatch if diagnosis.findings.iter().any(|f| f.contradicted.is_some()) => {
             format!("mismatch: the {it} does not fit the recording\n")

@@ -89,13 +89,15 @@ impl<'a> Case<'a> {
             model.refuse_other_size(sensor)?;
         }
         let bench = Workbench::new(sensor, measure_options(options));
-        let LoadedViews { mut fields, excluded, ranges, bench, known, copies } =
+        let LoadedViews { mut fields, mut excluded, ranges, bench, known, copies } =
             LoadedViews::of(recording, bench, model, progress)?;
-        let baseline = simulated
-            .map(|s| Baseline::of(s, sensor, &mut fields, model, options, progress))
-            .transpose()?;
-        if let Some(baseline) = &baseline {
-            baseline.references(&mut fields);
+        let mut baseline = None;
+        if let Some(simulated) = simulated {
+            let (measured, without_partner) =
+                Baseline::of(simulated, sensor, &mut fields, model, options, progress)?;
+            measured.references(&mut fields);
+            excluded.extend(without_partner);
+            baseline = Some(measured);
         }
         let steps = |f: &Field| f.column_steps.is_some();
         let in_both = baseline.as_ref().is_some_and(|b| b.fields.iter().any(steps));

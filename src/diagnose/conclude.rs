@@ -58,8 +58,7 @@ impl Case<'_> {
         let scenes = self.scenes();
         self.advise(&mut found, &scenes, outcomes, ends);
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
-        let tested =
-            (found.is_empty() && refitted.is_none()).then(|| self.verdict(&found, outcomes));
+        let tested = (found.is_empty() && refitted.is_none()).then(|| verdict(&found, outcomes));
         if found.is_empty() {
             found.extend(far_off(&self.survey, typical_sigma_mm(&self.fields)));
         }
@@ -96,7 +95,10 @@ impl Case<'_> {
         };
         let (after, mut done) = match tested {
             // Where nothing was found the model is the extended one, and was tested.
-            Some(verdict) => (After { verdict, remaining: Vec::new() }, self),
+            Some(tested) => {
+                let verdict = if verdict == Verdict::Inconclusive { verdict } else { tested };
+                (After { verdict, remaining: Vec::new() }, self)
+            }
             None => self.after(&extended, explained),
         };
         done.fields.iter_mut().for_each(|f| f.first.clear());

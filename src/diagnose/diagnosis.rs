@@ -44,7 +44,8 @@ pub enum Reference {
 pub enum Verdict {
     Match,
     Mismatch,
-    /// Nothing was found, and the mean or the size of the noise could not be tested.
+    /// Nothing was found, and the mean or the size of the noise could not be tested, or more views were
+    /// left out than looked at.
     Inconclusive,
 }
 

@@ -125,10 +125,10 @@ fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End>
 fn min_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     let scales: Vec<Vec<f64>> =
         ends.iter().map(|e| spread(table, &e.surface, |i| !e.off.contains(&i))).collect();
-    let min_shares =
+    let min_scales =
         scales.into_iter().min_by(|a, b| a.iter().sum::<f64>().total_cmp(&b.iter().sum()))?;
     let cost = |end: &End| -> f64 {
-        let t = table.rows.iter().zip(&end.surface.sigma).zip(&min_shares);
+        let t = table.rows.iter().zip(&end.surface.sigma).zip(&min_scales);
         t.map(|((r, sigma), scale)| ((r.sigma_m / sigma).ln() / scale).powi(2).min(OFF * OFF)).sum()
     };
     ends.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))

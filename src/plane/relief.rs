@@ -26,7 +26,7 @@ pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &Affine
     let lattice = Lattice::over(&w, image.rays, camera.width, camera.height);
     let residuals = lattice.residuals(&Gauge { fit, bend_m: BEND_M });
     let off = lattice.off(&residuals);
-    let min_pixels = MIN_PIXELS.div_ceil(lattice.pitch * lattice.pitch);
+    let min_nodes = MIN_PIXELS.div_ceil(lattice.pitch * lattice.pitch);
     let mut left = off.clone();
     let (mut mask, mut notes) = (vec![false; off.len()], Vec::new());
     for seed in 0..off.len() {
@@ -35,7 +35,7 @@ pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &Affine
         }
         let area = lattice.reached(&left, &[seed]);
         left.iter_mut().zip(&area).for_each(|(left, area)| *left &= !area);
-        if area.iter().filter(|a| **a).count() >= min_pixels {
+        if area.iter().filter(|a| **a).count() >= min_nodes {
             notes.push(describe(image, &lattice, fit, &area));
             mask.iter_mut().zip(&area).for_each(|(mask, area)| *mask |= area);
         }

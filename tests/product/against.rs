@@ -54,7 +54,8 @@ impl Sets {
             .output()
             .expect("the program runs");
         let text = String::from_utf8_lossy(&run.stderr);
-        assert!(text.contains("the simulation leaves out"), "{text}");
+        let answers = ["the simulation leaves out", "\ninconclusive: nothing was found"];
+        assert!(answers.iter().any(|answer| text.contains(answer)), "{text}");
         let json = std::fs::read(out.join("diagnosis.json")).expect("diagnosis.json");
         (run.status.code(), serde_json::from_slice(&json).expect("JSON"))
     }
@@ -177,6 +178,11 @@ fn other_views_and_other_sensors_are_refused_and_single_strangers_told() {
     assert_eq!(found["views"].as_array().expect("views").len(), 6);
     let told = |r: &&Value| r.as_str().is_some_and(|r| r.contains("has no view of this pose"));
     assert_eq!(remarks.iter().filter(told).count(), 3, "{remarks:?}");
+    assert_eq!(found["verdict"], "match", "{remarks:?}");
+    let few = sets.shoot_with("few", 1, None, &[0.9], 4);
+    let found = sets.diagnose(&more, &few, 0);
+    assert_eq!(found["verdict"], "inconclusive", "three of nine views: {found}");
+    assert_eq!(found["after"]["verdict"], "inconclusive");
 }
 
 #[test]

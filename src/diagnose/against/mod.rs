@@ -28,7 +28,7 @@ use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
 use crate::plane::Plane;
-use crate::view::{Recording, Sensor};
+use crate::view::{Excluded, Recording, Sensor};
 
 /// The simulated views, in the order of the real ones they belong to.
 pub struct Baseline {
@@ -48,7 +48,7 @@ pub struct Baseline {
 const SAME: f64 = 0.01;
 
 impl Baseline {
-    /// Read `simulated` and keep of `fields` those views that have a partner there.
+    /// Read `simulated` and keep of `fields` those views that have a partner there; the others are told.
     pub fn of(
         simulated: &Recording,
         real: &Sensor,
@@ -56,7 +56,7 @@ impl Baseline {
         model: &NoiseModel,
         options: &DiagnoseOptions,
         progress: Progress<'_>,
-    ) -> Result<Self> {
+    ) -> Result<(Self, Vec<Excluded>)> {
         // Disparities of both in the same px.
         let sensor = Sensor { baseline_m: real.baseline_m, ..simulated.sensor.clone() };
         same_sensor(real, &simulated.sensor)?;
@@ -69,17 +69,17 @@ impl Baseline {
         let all = fields.len();
         let mut left: Vec<Option<Field>> = theirs.into_iter().map(Some).collect();
         let mut kept = Vec::new();
-        let mut theirs = Vec::new();
+        let (mut theirs, mut without_partner) = (Vec::new(), Vec::new());
         for (field, partner) in fields.drain(..).zip(partner) {
             match partner.and_then(|p| left[p].take()) {
                 Some(twin) => {
                     kept.push(field);
                     theirs.push(twin);
                 }
-                None => remarks.push(format!(
-                    "view {} was left out: the simulated recording has no view of this pose",
-                    field.name
-                )),
+                None => without_partner.push(Excluded {
+                    view: field.name,
+                    reason: "the simulated recording has no view of this pose".into(),
+                }),
             }
         }
         *fields = kept;
@@ -95,7 +95,7 @@ impl Baseline {
         }
         let mut baseline = Baseline::measured(simulated, theirs, &bench, options);
         baseline.remarks = remarks;
-        Ok(baseline)
+        Ok((baseline, without_partner))
     }
 
     fn measured(

@@ -7,7 +7,8 @@ use super::*;
 use crate::camera::Camera;
 use crate::diagnose::edges::EdgeLoss;
 use crate::diagnose::edges::mixing::mixing;
-use crate::diagnose::edges::shadow::{Sides, band};
+use crate::diagnose::edges::shadow::{Band, Sides, band};
+use crate::diagnose::missing::report::shadow_finding;
 use crate::frame::DepthCode;
 use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
@@ -225,6 +226,8 @@ fn a_shadow_of_some_views_is_told_with_how_many() {
     let found = band(&shadows(|e| [0.0, last(e)]), 1e-3).expect("a shadow");
     assert_eq!((found.of_some, found.side), (Some([3, 10]), 1));
     assert!(found.lawful && (found.share[0] - 0.9).abs() < 0.05, "{found:?}");
+    let nameless = shadow_finding(Band { lawful: false, ..found }, &[]).shape.expect("a shape");
+    assert!(nameless.ends_with(" px, in 3 of 10 views"), "{nameless}");
     let lines = |e: f64| if e > 21.0 { 1.0 } else { 0.0 };
     assert!(band(&shadows(|e| [0.0, lines(e)]), 1e-3).is_none(), "a line is what a border errs by");
 }

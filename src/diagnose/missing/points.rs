@@ -94,13 +94,13 @@ fn binned(view: usize, all: impl Iterator<Item = [f64; 3]>, span: [f64; 2]) -> V
 const OFF: f64 = 0.3;
 const TOGETHER: f64 = 16.0;
 /// Shares are known no better.
-const MIN_LOSS: f64 = 0.002;
+const MIN_ERROR: f64 = 0.002;
 /// How far a point lies from an expected loss, in its standard errors.
 pub fn misfit(p: &Point, loss: f64) -> f64 {
     // Between what was expected and what was seen: neither alone may claim certainty.
     let half = 0.5 * (loss + p.share);
     let spread = half * (1.0 - half);
-    let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + MIN_LOSS * MIN_LOSS;
+    let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + MIN_ERROR * MIN_ERROR;
     let off = if p.at_least { (p.share - loss).max(0.0) } else { p.share - loss };
     off / variance.sqrt()
 }

@@ -248,8 +248,9 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
     };
     let rivals = [("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])];
     let mut finding = described(finding, family, &rivals, None);
-    let measured = finding.which_views().map(|which| format!(" Measured here: {which}."));
-    finding.physics.extend(measured);
+    let which = finding.which_views();
+    finding.physics.extend(which.iter().map(|which| format!(" Measured here: {which}.")));
+    finding.shape.iter_mut().for_each(|s| s.extend(which.iter().map(|which| format!(", {which}"))));
     finding
 }
 
