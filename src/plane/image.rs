@@ -69,24 +69,25 @@ impl InverseDepthImage<'_> {
         (REACH_SIGMAS * scale).max(REACH_FLOOR_M * w * w)
     }
 
-    /// Noise of the image itself, whatever its shape: second differences over eight pixels are
-    /// blind to planes and wider than a matching window's correlation.
+    /// Noise of the image itself, whatever its shape: second differences over nine pixels are blind to
+    /// planes and wider than a matching window's correlation. Nine is odd, and rows and columns are both
+    /// asked: what alternates from line to line is the sensor's, not the target's relief.
     pub(super) fn local_noise(&self, pixels: &[u32]) -> f64 {
-        const LAG: usize = 8;
+        const LAG: usize = 9;
         let width = self.camera.width;
         let stride = (pixels.len() / 3000).max(1);
-        let mut differences: Vec<f32> = pixels
-            .iter()
-            .step_by(stride)
-            .filter_map(|&i| {
-                let i = i as usize;
-                let u = i % width;
-                (u >= LAG && u + LAG < width)
-                    .then(|| (self.w[i - LAG] - 2.0 * self.w[i] + self.w[i + LAG]).abs())
-            })
-            .filter(|d| d.is_finite())
-            .collect();
-        let mad = f64::from(median_in_place(&mut differences));
+        let along = |step: usize, length: usize| {
+            let mut differences: Vec<f32> = pixels
+                .iter()
+                .step_by(stride)
+                .map(|&i| i as usize)
+                .filter(|i| (LAG..length.saturating_sub(LAG)).contains(&(i / step % length)))
+                .map(|i| (self.w[i - LAG * step] - 2.0 * self.w[i] + self.w[i + LAG * step]).abs())
+                .filter(|d| d.is_finite())
+                .collect();
+            f64::from(median_in_place(&mut differences))
+        };
+        let mad = along(1, width).max(along(width, self.camera.height));
         if mad.is_finite() { MAD_TO_SIGMA * mad / 6f64.sqrt() } else { 0.0 }
     }
 

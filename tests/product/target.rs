@@ -315,6 +315,27 @@ fn a_wall_that_the_sensor_bends_is_the_target() {
     assert!(target.is_err() || !target.unwrap().notes.iter().any(|n| n.contains("bent")));
 }
 
+/// A sensor that reads its even and odd columns, or rows, in two ways, by far beyond its noise: the target is as flat
+/// as it was, so that a diagnosis can say what the sensor does.
+#[test]
+fn lines_that_alternate_are_no_relief() {
+    let offset = 5.0 * SigmaModel::paper().sigma(2.0, 0.0) / 4.0;
+    for across in [true, false] {
+        let mut scene = draw(&[Thing::wall(2.0)], 7);
+        let width = scene.camera.width;
+        for (i, w) in scene.w.iter_mut().enumerate() {
+            let line = if across { i % width } else { i / width };
+            *w += (offset * [1.0, -1.0][line % 2]) as f32;
+        }
+        let region = Region::Rectangle([0.0, 0.0, width as f64, scene.camera.height as f64]);
+        for region in [None, Some(&region)] {
+            let target = find_in(&scene, region).unwrap();
+            assert!(target.pixels.len() as f64 > 0.95 * scene.w.len() as f64);
+            assert!(target.plane.theta().to_degrees() < 0.6, "{:?}", target.plane);
+        }
+    }
+}
+
 #[test]
 fn no_plane_no_target() {
     let ball = [Thing::sphere(0.0, 0.0, 1.0, 0.3)];
