@@ -189,3 +189,8 @@ fn all_of(reader: impl Read, max: u64) -> Result<Vec<u8>, String> {
         false => Ok(whole),
     }
 }
+
+/// Little-endian, of the first four bytes; 0 of fewer.
+pub fn word32(bytes: &[u8]) -> u32 {
+    bytes.first_chunk().map_or(0, |b| u32::from_le_bytes(*b))
+}

@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::bag::{Bag, Message, Topic, kind_of};
-use super::blocks::{Chunk, Chunks, Compression, Source};
+use super::blocks::{Chunk, Chunks, Compression, Source, word32};
 use super::wire::{Damage, Dialect, Wire};
 use crate::error::{Error, Result};
 
@@ -100,10 +100,6 @@ impl Bag for Mcap {
 
 fn word64(bytes: &[u8]) -> u64 {
     bytes.first_chunk().map_or(0, |b| u64::from_le_bytes(*b))
-}
-
-fn word32(bytes: &[u8]) -> u32 {
-    bytes.first_chunk().map_or(0, |b| u32::from_le_bytes(*b))
 }
 
 /// The channel of a message index, and its messages' times and places.

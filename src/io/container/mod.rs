@@ -63,21 +63,14 @@ enum Kind {
     Npz,
 }
 
-/// What a file of each kind begins with.
-const BEGINNINGS: [(&[u8], Kind); 5] = [
-    (b"#ROSBAG V", Kind::Ros1),
-    (b"\x89MCAP0\r\n", Kind::Mcap),
-    (b"SQLite format 3\0", Kind::Db3),
-    (b"\x93NUMPY", Kind::Npy),
-    (b"PK\x03\x04", Kind::Npz),
-];
-/// Names that promise such a file, so that a damaged one is not taken for something else.
-const EXTENSIONS: [(&str, Kind); 5] = [
-    ("bag", Kind::Ros1),
-    ("mcap", Kind::Mcap),
-    ("db3", Kind::Db3),
-    ("npy", Kind::Npy),
-    ("npz", Kind::Npz),
+/// What a file of each kind begins with, and the name that promises one, so that a damaged file is not
+/// taken for something else.
+const KINDS: [(&[u8], &str, Kind); 5] = [
+    (b"#ROSBAG V", "bag", Kind::Ros1),
+    (b"\x89MCAP0\r\n", "mcap", Kind::Mcap),
+    (b"SQLite format 3\0", "db3", Kind::Db3),
+    (b"\x93NUMPY", "npy", Kind::Npy),
+    (b"PK\x03\x04", "npz", Kind::Npz),
 ];
 
 impl Kind {
@@ -85,11 +78,12 @@ impl Kind {
         let mut first = [0; 16];
         let mut file = path.is_file().then(|| File::open(path).ok()).flatten()?;
         let n = file.read(&mut first).ok()?;
-        let begins = BEGINNINGS.iter().find(|(magic, _)| first[..n].starts_with(magic));
-        let named = |(name, _): &&(&str, Kind)| {
+        let begins = |(magic, ..): &&(&[u8], &str, Kind)| first[..n].starts_with(magic);
+        let named = |(_, name, _): &&(&[u8], &str, Kind)| {
             path.extension().is_some_and(|e| e.eq_ignore_ascii_case(name))
         };
-        begins.map(|(_, kind)| *kind).or_else(|| EXTENSIONS.iter().find(named).map(|(_, k)| *k))
+        let known = KINDS.iter().find(begins).or_else(|| KINDS.iter().find(named));
+        known.map(|(.., kind)| *kind)
     }
 }
 

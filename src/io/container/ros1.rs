@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::bag::{Bag, Message, Topic, kind_of};
-use super::blocks::{Chunk, Chunks, Compression, Source};
+use super::blocks::{Chunk, Chunks, Compression, Source, word32};
 use super::wire::Dialect;
 use crate::error::Result;
 
@@ -164,9 +164,7 @@ impl Ros1Bag {
             }
             let entries = source.bytes(record.data_at, record.data, "an index")?;
             for entry in entries.as_chunks::<12>().0 {
-                let word = |k: usize| {
-                    u32::from_le_bytes([entry[k], entry[k + 1], entry[k + 2], entry[k + 3]])
-                };
+                let word = |k: usize| word32(&entry[k..]);
                 let logged = i64::from(word(0)) * 1_000_000_000 + i64::from(word(4));
                 self.topics[topic].logged_ns.push(logged);
                 self.places[topic].push(Place { chunk: number, offset: word(8), connection });
@@ -189,10 +187,7 @@ impl Bag for Ros1Bag {
         let Place { chunk, offset, connection } = self.places[topic][number];
         let (chunk, at) = (chunk as usize, u64::from(offset));
         let bytes = |at: u64, n: u64| self.chunks.bytes(chunk, at, n, "a message");
-        let length = |at: u64| {
-            let word = bytes(at, 4)?;
-            Ok(u64::from(u32::from_le_bytes([word[0], word[1], word[2], word[3]])))
-        };
+        let length = |at: u64| bytes(at, 4).map(|word| u64::from(word32(&word)));
         let source = &self.chunks.source;
         let header = length(at)?;
         if header > MAX_HEADER {
@@ -220,10 +215,8 @@ struct Record<'s> {
 
 impl<'s> Record<'s> {
     fn at(source: &'s Source, at: u64) -> Result<Self> {
-        let length = |at: u64| -> Result<u64> {
-            let word = source.bytes(at, 4, "a record")?;
-            Ok(u64::from(u32::from_le_bytes([word[0], word[1], word[2], word[3]])))
-        };
+        let word = |at: u64| source.bytes(at, 4, "a record");
+        let length = |at: u64| word(at).map(|word| u64::from(word32(&word)));
         let header = length(at)?;
         if header > MAX_HEADER {
             let what = format!("at byte {at}: a record's header claims {header} bytes");
