@@ -70,11 +70,11 @@ impl SigmaTable {
         SigmaTable { rows }
     }
 
-    pub fn views(&self) -> usize {
+    pub fn views(&self) -> Vec<usize> {
         let mut seen: Vec<usize> = self.rows.iter().map(|r| r.view).collect();
         seen.sort_unstable();
         seen.dedup();
-        seen.len()
+        seen
     }
 
     pub fn range(&self, column: impl Fn(&SigmaRow) -> f64) -> [f64; 2] {
@@ -270,7 +270,7 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         let table = read_table(&path).unwrap();
         assert_eq!(table.rows.len(), 3);
-        assert_eq!(table.views(), 2);
+        assert_eq!(table.views().len(), 2);
         assert_eq!(table.rows[1].n_effective, Some(50.0));
     }
 }

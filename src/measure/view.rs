@@ -21,12 +21,8 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     let held: Vec<Frame> = reader.hold(view)?.into_iter().map(|(_, frame)| frame).collect();
     let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
-    for frame in &held {
-        scan.add(frame);
-    }
-    while let Some(frame) = reader.next_readable() {
-        scan.add(&frame);
-    }
+    held.iter().for_each(|frame| scan.add(frame));
+    reader.by_ref().for_each(|(_, frame)| scan.add(&frame));
     let mut notes = reader.notes;
     let paper = by_the_paper(view, bench, &target, &held[0], scan.sigma_perpendicular());
     let infrared = infrared_of(view, &target, bench, &mut notes);
@@ -105,23 +101,20 @@ impl<'r> FrameReader<'r> {
     }
 
     fn hold(&mut self, view: &View) -> Result<Vec<(usize, Frame)>> {
-        let mut held = Vec::new();
-        while held.len() < HELD_FRAMES {
-            let Some(numbered) = self.next_numbered() else { break };
-            held.push(numbered);
-        }
+        let held: Vec<(usize, Frame)> = self.by_ref().take(HELD_FRAMES).collect();
         if held.is_empty() {
             let why = self.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
             return Err(failed(view, why, "record the view again"));
         }
         Ok(held)
     }
+}
 
-    fn next_readable(&mut self) -> Option<Frame> {
-        self.next_numbered().map(|(_, frame)| frame)
-    }
+impl Iterator for FrameReader<'_> {
+    /// With its number in the view.
+    type Item = (usize, Frame);
 
-    fn next_numbered(&mut self) -> Option<(usize, Frame)> {
+    fn next(&mut self) -> Option<(usize, Frame)> {
         while let Some((number, frame_ref)) = self.frames.next() {
             match self.source.frame(frame_ref) {
                 Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {

@@ -49,7 +49,7 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
         let p = fitted.values();
         let extra = fitted.extra_within.powi(2) + fitted.extra_between.powi(2);
         let rows = Rows::new(&test);
-        for view in views_of(&test) {
+        for view in test.views() {
             let (mut s, mut q, mut c, mut n) = (0.0, 0.0, 0.0, 0.0);
             for (i, r) in rows.iter().enumerate().filter(|(_, r)| r.view == view) {
                 let predicted = form.spec().sigma(&p, r.z_m, r.theta_rad);
@@ -93,16 +93,10 @@ pub fn compare_forms(table: &SigmaTable) -> Vec<HeldOut> {
     scores
 }
 
-fn views_of(table: &SigmaTable) -> Vec<usize> {
-    let mut views: Vec<usize> = table.rows.iter().map(|r| r.view).collect();
-    views.sort_unstable();
-    views.dedup();
-    views
-}
-
 /// Each view with the number of its fold, by its mean distance.
 fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
-    let mut views: Vec<(usize, f64)> = views_of(table)
+    let mut views: Vec<(usize, f64)> = table
+        .views()
         .into_iter()
         .map(|view| {
             let z: Vec<f64> = table.rows.iter().filter(|r| r.view == view).map(|r| r.z_m).collect();

@@ -100,16 +100,8 @@ impl Rows {
     pub fn distances(&self, ratio: f64) -> usize {
         let mut z: Vec<f64> = self.rows.iter().map(|r| r.z_m).collect();
         z.sort_by(f64::total_cmp);
-        let mut last = 0.0;
-        z.into_iter()
-            .filter(|&z| {
-                let new = z > last * ratio;
-                if new {
-                    last = z
-                }
-                new
-            })
-            .count()
+        z.dedup_by(|next, last| *next <= *last * ratio);
+        z.len()
     }
 
     /// Make residuals relative to these sigmas, m.
