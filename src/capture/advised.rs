@@ -38,9 +38,7 @@ struct KnownView {
 impl Wanted {
     /// The views that a diagnosis asks for (`diagnosis.json`). A view that it has seen already is
     /// not the one it asks for: another at the same pose is numbered.
-    ///
-    /// # Errors
-    /// When it is no diagnosis, advises nothing, or a pose that cannot be.
+    /// An error when it is no diagnosis, advises nothing, or a pose that cannot be.
     pub fn advised(path: &Path) -> Result<Self> {
         let text = read_json(path)?;
         let remedy = "give the diagnosis.json that kinoise diagnose wrote";

@@ -27,9 +27,7 @@ pub struct Growing {
 impl Growing {
     /// Wait for the first image for at most `patience`, as it has the frames' size. Images that
     /// are there already are frames too.
-    ///
-    /// # Errors
-    /// When there is no such folder, no image comes, or the intrinsics are not known.
+    /// An error when there is no such folder, no image comes, or the intrinsics are not known.
     pub fn open(root: &Path, assumed: &Assumed, patience: Duration) -> Result<Self> {
         if !root.is_dir() {
             let remedy = "start the program that fills it first, or make it";

@@ -26,9 +26,7 @@ pub struct Playback {
 
 impl Playback {
     /// Open any layout that kinoise reads.
-    ///
-    /// # Errors
-    /// As [`crate::io::open`].
+    /// Errors as those of [`crate::io::open`].
     pub fn open(root: &Path, assumed: &Assumed, paced: bool) -> Result<Self> {
         let recording = open_uncut(root, assumed)?;
         let mut frames: Vec<(FrameRef, Option<FrameRef>)> = Vec::new();

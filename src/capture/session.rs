@@ -41,9 +41,7 @@ struct PartialView {
 
 impl Session {
     /// Begin a recording in a new or empty folder, or go on with the one that is there.
-    ///
-    /// # Errors
-    /// When something else is in the folder, another sensor took what is there, another capture
+    /// An error when something else is in the folder, another sensor took what is there, another capture
     /// is writing into it, or it cannot be written.
     pub fn open(root: &Path, sensor: &Sensor) -> Result<Self> {
         if root.exists() && !root.is_dir() {
@@ -93,18 +91,14 @@ impl Session {
     }
 
     /// Names of the views that are whole.
-    ///
-    /// # Errors
-    /// When the folder cannot be read.
+    /// An error when the folder cannot be read.
     pub fn taken(&self) -> Result<Vec<String>> {
         let whole = entries(&self.root)?.into_iter().filter(|p| p.join(DEPTH_LIST).is_file());
         Ok(whole.filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect())
     }
 
     /// Begin a view.
-    ///
-    /// # Errors
-    /// When its folder cannot be made.
+    /// An error when its folder cannot be made.
     pub fn begin(&mut self, name: &str) -> Result<()> {
         self.abandon();
         let folder = self.root.join(PARTIAL).join(name);
@@ -115,17 +109,13 @@ impl Session {
     }
 
     /// Add a frame to the view that was begun.
-    ///
-    /// # Errors
-    /// When it cannot be written.
+    /// An error when it cannot be written.
     pub fn keep(&mut self, frame: &LiveFrame) -> Result<()> {
         self.partial.as_mut().map_or(Ok(()), |view| view.keep(frame))
     }
 
     /// The view is whole: put it where it belongs, in place of one of that name.
-    ///
-    /// # Errors
-    /// When it cannot be written; an older view of that name then stands as it stood.
+    /// An error when it cannot be written; an older view of that name then stands as it stood.
     pub fn finish(&mut self, notes: &ViewNotes) -> Result<()> {
         let Some(view) = &self.partial else { return Ok(()) };
         view.close(notes)?;
@@ -149,9 +139,7 @@ impl Session {
     }
 
     /// Throw a whole view away, at once: it shall not count as taken, however this run ends.
-    ///
-    /// # Errors
-    /// When it cannot be moved; it then stands as it stood.
+    /// An error when it cannot be moved; it then stands as it stood.
     pub fn reject(&mut self, name: &str) -> Result<()> {
         let partial = self.root.join(PARTIAL);
         fs::create_dir_all(&partial).map_err(|e| failed(&partial, e))?;

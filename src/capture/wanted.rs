@@ -179,9 +179,7 @@ impl Wanted {
     }
 
     /// Want a view again that is among those `taken`.
-    ///
-    /// # Errors
-    /// When there is no such view, or its name does not tell its pose.
+    /// An error when there is no such view, or its name does not tell its pose.
     pub fn take_again(&mut self, name: &str, taken: &[String]) -> Result<()> {
         let refuse = |why: &str, remedy: &'static str| Error::Argument {
             what: format!("--retake {name}: {why}"),

@@ -90,9 +90,7 @@ impl Watcher {
     }
 
     /// The target in this frame, or why there is none.
-    ///
-    /// # Errors
-    /// A sentence that says why.
+    /// An error says why.
     pub fn look(&mut self, frame: &Frame) -> Result<Sighting, String> {
         self.take_in(frame);
         let followed = match self.followed.take().and_then(|f| self.follow(f)) {

@@ -78,9 +78,7 @@ pub(crate) struct Drift {
 
 impl Correction {
     /// What `model` says about `sensor`.
-    ///
-    /// # Errors
-    /// When the model is of a sensor of another resolution, or holds what the catalogue has not.
+    /// An error when the model is of a sensor of another resolution, or holds what the catalogue has not.
     pub fn of(model: &NoiseModel, sensor: &Sensor) -> Result<Self> {
         let of_model = model.described_sensor()?;
         model.refuse_other_size(sensor)?;

@@ -28,9 +28,7 @@ fn max_bytes(file: &Path) -> u64 {
 
 /// Every file below `root`, as paths relative to it, in name order. A link may lead out of `root` to
 /// what is `read` as part of the recording, so that folders of links to some of its views will do.
-///
-/// # Errors
-/// When one is no regular file, or stands outside and is not `read`: it may be private.
+/// An error when one is no regular file, or stands outside and is not `read`: it may be private.
 pub(super) fn files_below(root: &Path, read: &HashSet<&Path>) -> Result<Vec<PathBuf>> {
     let real_root = root.canonicalize().map_err(|e| Error::read(root, e))?;
     let mut files = Vec::new();
@@ -117,9 +115,7 @@ pub(super) fn make_folder_of(file: &Path) -> Result<()> {
 }
 
 /// Where a listed image stands, relative to `root`.
-///
-/// # Errors
-/// When it stands outside: written again it would be lost.
+/// An error when it stands outside: written again it would be lost.
 pub(super) fn inside(root: &Path, file: &Path) -> Result<PathBuf> {
     let mut parts: Vec<Component<'_>> = Vec::new();
     let relative = file.strip_prefix(root).ok();

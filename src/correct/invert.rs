@@ -20,9 +20,7 @@ const MAX_ROUNDS: usize = 8;
 impl Correction {
     /// Take the biases out of one depth image, m; NaN where there is no measurement stays NaN. A
     /// depth becomes infinite where the errors leave no disparity.
-    ///
-    /// # Errors
-    /// When the image is not of the sensor's size.
+    /// An error when the image is not of the sensor's size.
     pub fn apply(&self, depth_m: &mut [f32], conditions: &Conditions) -> Result<()> {
         self.refuse_size(depth_m)?;
         if self.is_identity() {
@@ -41,9 +39,7 @@ impl Correction {
     }
 
     /// As [`Correction::apply`], in double precision.
-    ///
-    /// # Errors
-    /// When the image is not of the sensor's size.
+    /// An error when the image is not of the sensor's size.
     pub fn corrected(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f64>> {
         self.refuse_size(depth_m)?;
         if self.is_identity() {
@@ -140,9 +136,7 @@ impl Correction {
     /// Standard deviation of each stored depth, m, as the model predicts it: sigma at the corrected
     /// depth and the surface's tilt, times what the model's terms of the variance say there; NaN where
     /// there is no depth.
-    ///
-    /// # Errors
-    /// When the image is not of the sensor's size.
+    /// An error when the image is not of the sensor's size.
     pub fn sigma_m(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f64>> {
         self.refuse_size(depth_m)?;
         let mut known = self.known(depth_m, conditions);

@@ -27,9 +27,7 @@ pub struct CorrectOptions<'a> {
 /// the depth. Where nothing described the sensor, recording.json does in `output`. Raw disparities become metric values, finer than the read-out's steps, unless
 /// `keep_code`. Images of the uncertainty have the depth images' names, 16 bit, in units of 10 um
 /// ([`SIGMA_UNITS_PER_METRE`]); 0 where there is no depth.
-///
-/// # Errors
-/// When `root` is no recording, the model is of another resolution, or `output` has something in
+/// An error when `root` is no recording, the model is of another resolution, or `output` has something in
 /// it, lies inside `root`, or cannot be written.
 pub fn correct_recording(
     root: &Path,

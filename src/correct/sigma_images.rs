@@ -36,9 +36,7 @@ const TOP: f64 = 65535.0;
 /// Write into `output`: `sigma/*.png`, 16 bit, in units of 10 um ([`SIGMA_UNITS_PER_METRE`]), 0 where
 /// there is no depth; `sigma.txt`, their stamps and paths as TUM lists have them; `sigma.json`, which
 /// says what the numbers mean. An image has the name of its depth image.
-///
-/// # Errors
-/// When the model is of another sensor, a depth image cannot be read, or `output` not written.
+/// An error when the model is of another sensor, a depth image cannot be read, or `output` not written.
 pub fn sigma_images(
     sequence: &Sequence,
     model: &NoiseModel,

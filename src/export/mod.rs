@@ -47,9 +47,7 @@ pub enum ExportFormat {
 }
 
 /// `model` as a file of another format.
-///
-/// # Errors
-/// When the format asks for what the model has not: a sensor, a baseline, an image of a certain size.
+/// An error when the format asks for what the model has not: a sensor, a baseline, an image of a certain size.
 pub fn export(model: &NoiseModel, format: ExportFormat) -> Result<Exported> {
     match format {
         ExportFormat::Python => python::write(model),

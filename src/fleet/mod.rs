@@ -68,9 +68,7 @@ pub struct Unit {
 type Group<'a> = (String, Vec<&'a UnitModel>);
 
 /// Compare them: two models at least, of one kind of sensor.
-///
-/// # Errors
-/// When they cannot be compared: too few, of several kinds, without errors, of the same frames, or
+/// An error when they cannot be compared: too few, of several kinds, without errors, of the same frames, or
 /// measured at distances that have nothing in common.
 pub fn compare(models: &[UnitModel]) -> Result<Comparison> {
     let mut remarks = unit::check(models)?;

@@ -21,9 +21,7 @@ pub struct Dump {
 
 impl Dump {
     /// Check the dump at `root`.
-    ///
-    /// # Errors
-    /// When there is no index, or its first line is already bad.
+    /// An error when there is no index, or its first line is already bad.
     pub fn open(root: &Path) -> Result<Self> {
         let index = root.join(INDEX);
         let text = read_text(&index)?;
@@ -49,9 +47,7 @@ impl Dump {
     }
 
     /// Allow fakenect its next line.
-    ///
-    /// # Errors
-    /// A sentence that says why the dump ends here.
+    /// An error says why the dump ends here.
     pub fn advance(&mut self) -> std::result::Result<(), String> {
         self.left = self.left.checked_sub(1).ok_or_else(|| self.ending.clone())?;
         Ok(())

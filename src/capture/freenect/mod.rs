@@ -56,9 +56,7 @@ pub struct FreenectSource {
 
 impl FreenectSource {
     /// Load the library, find the unit, start its depth.
-    ///
-    /// # Errors
-    /// When the library is missing or something else, no unit is there, or it cannot be started.
+    /// An error when the library is missing or something else, no unit is there, or it cannot be started.
     pub fn open(options: FreenectOptions) -> Result<Self> {
         let (to_queue, arrivals) = sync_channel(CAPACITY);
         let (to_opened, opened) = sync_channel(1);

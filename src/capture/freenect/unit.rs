@@ -38,9 +38,7 @@ pub struct Unit {
 
 impl Unit {
     /// Load the library, find the unit, start its depth.
-    ///
-    /// # Errors
-    /// When the library is missing or something else, no unit is there, or it cannot be started.
+    /// An error when the library is missing or something else, no unit is there, or it cannot be started.
     pub fn open(options: &FreenectOptions) -> Result<Self> {
         let (library, dump) = load(options)?;
         let serial = serial(&library, options.serial.as_deref())?;
