@@ -83,22 +83,9 @@ fn decode(
     encoding: Encoding,
 ) -> Result<((usize, usize), Pixels)> {
     let message = bag.message(topic, number, u64::MAX)?;
-    let head = head(bag, topic, &message.bytes, encoding);
+    let head = ImageHead::read(&message.bytes, bag.topics()[topic].dialect, encoding.is_raw);
     let decoded = head.and_then(|head| encoding.decode(&head, &message.bytes));
     decoded.map_err(|damage| damaged(bag, topic, number, &damage))
-}
-
-fn head(
-    bag: &dyn Bag,
-    topic: usize,
-    bytes: &[u8],
-    encoding: Encoding,
-) -> Result<ImageHead, String> {
-    let dialect = bag.topics()[topic].dialect;
-    match encoding.is_raw() {
-        true => ImageHead::raw(bytes, dialect),
-        false => ImageHead::compressed(bytes, dialect),
-    }
 }
 
 /// What every message of the topic says, and of floats what they hold.
@@ -123,7 +110,7 @@ impl Survey {
             stamps_ns.clone_from(logged_ns);
         }
         // A compressed image's size is in its bytes.
-        let size = match depth.encoding.is_raw() {
+        let size = match depth.encoding.is_raw {
             true => heads.first().map_or((0, 0), |h| h.1),
             false => decode(bag, depth.topic, 0, depth.encoding)?.0,
         };
@@ -133,7 +120,7 @@ impl Survey {
             }
             Ok(scale)
         };
-        let scale = match depth.encoding.is_float() {
+        let scale = match depth.encoding.is_float {
             // Sums of whole numbers: the same however the messages are shared out.
             true => {
                 let sums = numbers().try_fold(Scale::new, add);
@@ -152,7 +139,8 @@ impl Survey {
     ) -> Result<(i64, (usize, usize))> {
         let damage = |why: String| damaged(bag, topic, number, &why);
         let message = bag.message(topic, number, HEAD_BYTES)?;
-        let head = head(bag, topic, &message.bytes, encoding).map_err(damage)?;
+        let dialect = bag.topics()[topic].dialect;
+        let head = ImageHead::read(&message.bytes, dialect, encoding.is_raw).map_err(damage)?;
         match encoding.fault(&head, message.length) {
             Some(fault) => Err(damage(fault)),
             None => Ok((head.stamp_ns, head.size)),

@@ -31,25 +31,15 @@ fn header(wire: &mut Wire) -> Result<(i64, String), Damage> {
 }
 
 impl ImageHead {
-    /// Of a raw image.
-    pub fn raw(bytes: &[u8], dialect: Dialect) -> Result<Self, Damage> {
+    /// Of a raw image, or of a compressed one, whose size its bytes know.
+    pub fn read(bytes: &[u8], dialect: Dialect, is_raw: bool) -> Result<Self, Damage> {
         let mut wire = Wire::new(bytes, dialect)?;
         let (stamp_ns, frame_id) = header(&mut wire)?;
-        let (height, width) = (wire.u32()? as usize, wire.u32()? as usize);
-        let (encoding, big_endian) = (wire.text()?, wire.u8()? != 0);
-        let (step, data) = (wire.u32()? as usize, wire.u32()? as usize);
-        let data_at = bytes.len() - wire.left();
-        let size = (width, height);
-        Ok(ImageHead { stamp_ns, frame_id, size, encoding, big_endian, step, data_at, data })
-    }
-
-    /// Of a compressed one, whose size its bytes know.
-    pub fn compressed(bytes: &[u8], dialect: Dialect) -> Result<Self, Damage> {
-        let mut wire = Wire::new(bytes, dialect)?;
-        let (stamp_ns, frame_id) = header(&mut wire)?;
-        let (encoding, data) = (wire.text()?, wire.u32()? as usize);
-        let data_at = bytes.len() - wire.left();
-        let (size, big_endian, step) = ((0, 0), false, 0);
+        let [height, width] = if is_raw { [wire.u32()?, wire.u32()?] } else { [0; 2] };
+        let (encoding, big_endian) = (wire.text()?, is_raw && wire.u8()? != 0);
+        let step = if is_raw { wire.u32()? as usize } else { 0 };
+        let data = wire.u32()? as usize;
+        let (data_at, size) = (bytes.len() - wire.left(), (width as usize, height as usize));
         Ok(ImageHead { stamp_ns, frame_id, size, encoding, big_endian, step, data_at, data })
     }
 }

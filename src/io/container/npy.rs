@@ -17,20 +17,11 @@ pub struct Header {
 /// Type and byte order of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Number {
-    kind: Kind,
+    /// NumPy's letter: u, i or f.
+    kind: u8,
+    /// Bytes.
+    pub size: usize,
     big_endian: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    U8,
-    U16,
-    I16,
-    I32,
-    U32,
-    I64,
-    F32,
-    F64,
 }
 
 /// Longer than any header of numbers.
@@ -82,44 +73,23 @@ impl Header {
     /// Of the numbers; nothing when no file can be that long.
     pub fn bytes(&self) -> Option<u64> {
         let times = |n: u64, &size: &usize| n.checked_mul(size as u64);
-        self.shape.iter().try_fold(self.number.size() as u64, times)
+        self.shape.iter().try_fold(self.number.size as u64, times)
     }
 }
 
 impl Number {
     /// Of "<u2" and the like.
     fn of(descr: &str) -> Option<Self> {
-        let (order, kind) = descr.split_at_checked(1)?;
-        let kind = match kind {
-            "u1" => Kind::U8,
-            "u2" => Kind::U16,
-            "i2" => Kind::I16,
-            "i4" => Kind::I32,
-            "u4" => Kind::U32,
-            "i8" => Kind::I64,
-            "f4" => Kind::F32,
-            "f8" => Kind::F64,
-            _ => return None,
-        };
-        let big_endian = match order {
-            "<" | "|" | "=" => false,
-            ">" => true,
-            _ => return None,
-        };
-        Some(Number { kind, big_endian })
-    }
-
-    pub fn size(self) -> usize {
-        match self.kind {
-            Kind::U8 => 1,
-            Kind::U16 | Kind::I16 => 2,
-            Kind::I32 | Kind::U32 | Kind::F32 => 4,
-            Kind::I64 | Kind::F64 => 8,
-        }
+        let [order, kind, size] = *descr.as_bytes() else { return None };
+        let known =
+            matches!(&[kind, size], b"u1" | b"u2" | b"u4" | b"i2" | b"i4" | b"i8" | b"f4" | b"f8");
+        let number =
+            Number { kind, size: usize::from(size.wrapping_sub(b'0')), big_endian: order == b'>' };
+        (known && b"<|=>".contains(&order)).then_some(number)
     }
 
     pub fn is_float(self) -> bool {
-        matches!(self.kind, Kind::F32 | Kind::F64)
+        self.kind == b'f'
     }
 
     pub fn values(self, bytes: &[u8]) -> Vec<f64> {
@@ -130,22 +100,22 @@ impl Number {
                 each([bytes].into_iter(), of).into_iter().map($as).collect()
             }};
         }
-        match self.kind {
-            Kind::U8 => values!(u8, f64::from),
-            Kind::U16 => values!(u16, f64::from),
-            Kind::I16 => values!(i16, f64::from),
-            Kind::I32 => values!(i32, f64::from),
-            Kind::U32 => values!(u32, f64::from),
-            Kind::I64 => values!(i64, |v| v as f64),
-            Kind::F32 => values!(f32, f64::from),
-            Kind::F64 => values!(f64, f64::from),
+        match (self.kind, self.size) {
+            (b'u', 1) => values!(u8, f64::from),
+            (b'u', 2) => values!(u16, f64::from),
+            (b'i', 2) => values!(i16, f64::from),
+            (b'i', 4) => values!(i32, f64::from),
+            (b'u', 4) => values!(u32, f64::from),
+            (b'i', 8) => values!(i64, |v| v as f64),
+            (b'f', 4) => values!(f32, f64::from),
+            _ => values!(f64, f64::from),
         }
     }
 
     /// One image: words as they are, floats as metres, of which a value has `per_metre`.
     /// What is wrong, when integers are no 16-bit words.
     pub fn pixels(self, bytes: &[u8], per_metre: f64) -> Result<Pixels, String> {
-        if (self.kind, self.big_endian) == (Kind::U16, false) {
+        if (self.kind, self.size, self.big_endian) == (b'u', 2, false) {
             return Ok(Pixels::Words(each([bytes].into_iter(), u16::from_le_bytes)));
         }
         let values = self.values(bytes);

@@ -13,53 +13,34 @@ pub enum Pixels {
     Metres(Vec<f32>),
 }
 
-/// How the depth of a topic is written.
+/// How the depth of a topic is written: in words or as metres (of a compressed image, quantised inverse
+/// depths), as it is or as a 16-bit PNG behind a header of compressed_depth_image_transport.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Encoding {
-    Words,
-    Metres,
-    /// A 16-bit PNG behind a header of compressed_depth_image_transport.
-    CompressedWords,
-    /// The same, of quantised inverse depths.
-    CompressedMetres,
+pub struct Encoding {
+    pub is_raw: bool,
+    pub is_float: bool,
 }
 
 /// Bytes before the PNG: an enumeration and two floats.
 const HEADER: usize = 12;
 
 impl Encoding {
-    /// Of a raw image's encoding.
-    pub fn raw(encoding: &str) -> Option<Self> {
-        match encoding {
-            "16UC1" | "mono16" => Some(Encoding::Words),
-            "32FC1" => Some(Encoding::Metres),
-            _ => None,
-        }
-    }
-
-    /// Of a compressed image's format: "16UC1; compressedDepth png".
-    pub fn compressed(format: &str) -> Option<Self> {
-        let (encoding, how) = format.split_once(';')?;
-        if !how.contains("compressedDepth") || how.contains("rvl") {
+    /// Of a raw image's encoding, or of a compressed image's format: "16UC1; compressedDepth png".
+    pub fn of(said: &str, is_raw: bool) -> Option<Self> {
+        let (encoding, how) = if is_raw { (said, "") } else { said.split_once(';')? };
+        if !is_raw && (!how.contains("compressedDepth") || how.contains("rvl")) {
             return None;
         }
-        match encoding.trim() {
-            "16UC1" | "mono16" => Some(Encoding::CompressedWords),
-            "32FC1" => Some(Encoding::CompressedMetres),
-            _ => None,
-        }
-    }
-
-    pub fn is_raw(self) -> bool {
-        matches!(self, Encoding::Words | Encoding::Metres)
-    }
-
-    pub fn is_float(self) -> bool {
-        matches!(self, Encoding::Metres | Encoding::CompressedMetres)
+        let is_float = match encoding.trim() {
+            "16UC1" | "mono16" => false,
+            "32FC1" => true,
+            _ => return None,
+        };
+        Some(Encoding { is_raw, is_float })
     }
 
     fn pixel_bytes(self) -> usize {
-        if self == Encoding::Metres { 4 } else { 2 }
+        if self.is_float { 4 } else { 2 }
     }
 
     /// What is wrong with a head in a message of `length` bytes, before its pixels are read.
@@ -69,7 +50,7 @@ impl Encoding {
             let left = length.saturating_sub(head.data_at as u64);
             return Some(format!("{} bytes of image are announced, {left} are there", head.data));
         }
-        if !self.is_raw() {
+        if !self.is_raw {
             return None;
         }
         if !usable_size(width, height) {
@@ -94,15 +75,15 @@ impl Encoding {
             return Err(fault);
         }
         let data = &message[head.data_at..head.data_at + head.data];
-        if !self.is_raw() {
+        if !self.is_raw {
             return self.decode_compressed(data);
         }
         let (width, height) = head.size;
         let row = width * self.pixel_bytes();
         let rows = (0..height).map(|v| &data[v * head.step..][..row]);
-        let pixels = match (self, head.big_endian) {
-            (Encoding::Words, false) => Pixels::Words(each(rows, u16::from_le_bytes)),
-            (Encoding::Words, true) => Pixels::Words(each(rows, u16::from_be_bytes)),
+        let pixels = match (self.is_float, head.big_endian) {
+            (false, false) => Pixels::Words(each(rows, u16::from_le_bytes)),
+            (false, true) => Pixels::Words(each(rows, u16::from_be_bytes)),
             (_, false) => Pixels::Metres(each(rows, f32::from_le_bytes)),
             (_, true) => Pixels::Metres(each(rows, f32::from_be_bytes)),
         };
@@ -115,7 +96,7 @@ impl Encoding {
         };
         let frame = png16(png).map_err(|(what, _)| what)?;
         let size = (frame.width, frame.height);
-        if self == Encoding::CompressedWords {
+        if !self.is_float {
             return Ok((size, Pixels::Words(frame.raw)));
         }
         let float = |at: usize| {

@@ -54,7 +54,7 @@ fn positive(value: f64) -> Option<f64> {
 fn unit_of_message(bag: &dyn Bag, depth: usize) -> Option<f64> {
     let dialect = bag.topics()[depth].dialect;
     let message = bag.message(depth, 0, u64::MAX).ok()?;
-    let head = ImageHead::raw(&message.bytes, dialect).ok().filter(|h| h.frame_id == "1")?;
+    let head = ImageHead::read(&message.bytes, dialect, true).ok().filter(|h| h.frame_id == "1")?;
     let behind = message.bytes.get(head.data_at + head.data..)?;
     positive(meant(Wire::new(behind, dialect).ok()?.f32().ok()?))
 }

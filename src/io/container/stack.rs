@@ -176,7 +176,7 @@ struct Stack {
 impl Stack {
     fn pixels(&self, index: usize) -> Result<Pixels> {
         let Header { number, length, .. } = self.array.header;
-        let n = (self.size.0 * self.size.1 * number.size()) as u64;
+        let n = (self.size.0 * self.size.1 * number.size) as u64;
         let what = self.place(index);
         let bytes = self.array.body.bytes(length + index as u64 * n, n, &what)?;
         number.pixels(&bytes, self.values_per_metre).map_err(|why| {

@@ -59,7 +59,7 @@ fn is_infrared(name: &str) -> bool {
 /// How the depth of a topic is written, or why it is none.
 fn encoding(bag: &dyn Bag, topic: usize) -> Result<Result<Encoding, String>> {
     let Topic { dialect, logged_ns, kind, .. } = &bag.topics()[topic];
-    let raw = match &**kind {
+    let is_raw = match &**kind {
         "sensor_msgs/Image" => true,
         "sensor_msgs/CompressedImage" => false,
         other => return Ok(Err(format!("holds {other}, no images"))),
@@ -68,14 +68,10 @@ fn encoding(bag: &dyn Bag, topic: usize) -> Result<Result<Encoding, String>> {
         return Ok(Err("holds no message".into()));
     }
     let first = bag.message(topic, 0, HEAD_BYTES)?;
-    let head = match raw {
-        true => ImageHead::raw(&first.bytes, *dialect),
-        false => ImageHead::compressed(&first.bytes, *dialect),
-    };
-    let head = head.map_err(|damage| damaged(bag, topic, 0, &damage))?;
-    let known =
-        if raw { Encoding::raw(&head.encoding) } else { Encoding::compressed(&head.encoding) };
-    Ok(known.ok_or_else(|| format!("holds images as \"{}\", which is no depth", head.encoding)))
+    let head = ImageHead::read(&first.bytes, *dialect, is_raw)
+        .map_err(|damage| damaged(bag, topic, 0, &damage))?;
+    Ok(Encoding::of(&head.encoding, is_raw)
+        .ok_or_else(|| format!("holds images as \"{}\", which is no depth", head.encoding)))
 }
 
 /// The error of one message.
