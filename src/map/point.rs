@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::model::{FacingLookup, NoiseModel, SigmaLookup};
+use crate::model::{NoiseModel, SigmaLookup};
 
 /// A point of a depth image, or the mean of some, with its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +57,6 @@ impl Motion {
 /// Sigma over depth and tilt, looked up, and how many neighbours err as one.
 pub struct Noise {
     table: SigmaLookup,
-    facing: FacingLookup,
     /// The greatest depth that the model was measured at, m.
     max_depth_m: f32,
     /// Pixels that err together: the area of the window that neighbours share, px^2.
@@ -79,10 +78,8 @@ impl Noise {
         let number = |name: &str| entry?.number(name).filter(|n| n.is_finite());
         let length = number(CORRELATION[1]).unwrap_or(1.0).max(1.0);
         let share = number(CORRELATION[2]).unwrap_or(1.0).clamp(0.0, 1.0);
-        let table = SigmaLookup::of(&model.sigma);
         Noise {
-            facing: table.facing(),
-            table,
+            table: SigmaLookup::of(&model.sigma),
             max_depth_m: model.sigma.domain.z_m[1] as f32,
             correlated_px2: (1.0 + share * (length * length - 1.0)) as f32,
         }
@@ -98,7 +95,7 @@ impl Noise {
 
     /// The same of a surface that is faced squarely.
     pub fn sigma_facing(&self, z: f32) -> f32 {
-        self.grown(z, self.facing.at(z))
+        self.grown(z, self.table.at(z, 0.0))
     }
 
     #[inline]

@@ -26,5 +26,5 @@ pub use heldout::{HeldOut, compare_forms, held_out};
 pub use outliers::{Sorted, fit, sort_out};
 pub use provenance::{FitSummary, Provenance, Searched};
 pub use statistics::{Parameter, Quality, SigmaFit};
-pub use surface::{Direction, Domain, FacingLookup, SigmaLookup, SigmaModel};
+pub use surface::{Direction, Domain, SigmaLookup, SigmaModel};
 pub use uncertainty::{Conditions, NO_ACCEPTANCE_TEST, Uncertainty, ViewUncertainty};

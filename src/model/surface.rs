@@ -176,7 +176,7 @@ impl SigmaModel {
 #[derive(Debug, Clone)]
 pub struct SigmaLookup {
     domain: Domain,
-    /// Depth by depth, m.
+    /// Tilt by tilt, m: what is faced squarely stands in a row.
     nodes: Vec<f32>,
 }
 
@@ -191,10 +191,10 @@ impl SigmaLookup {
         let domain = model.domain;
         let ([z0, z1], steepest) = (domain.z_m, domain.theta_rad[1]);
         let mut nodes = Vec::with_capacity(DEPTHS * TILTS);
-        for i in 0..DEPTHS {
-            let z = z0 + (z1 - z0) * i as f64 / (DEPTHS - 1) as f64;
-            for j in 0..TILTS {
-                let left = 1.0 - j as f64 / (TILTS - 1) as f64;
+        for j in 0..TILTS {
+            let left = 1.0 - j as f64 / (TILTS - 1) as f64;
+            for i in 0..DEPTHS {
+                let z = z0 + (z1 - z0) * i as f64 / (DEPTHS - 1) as f64;
                 nodes.push(model.axial_sigma(z, steepest * (1.0 - left * left)) as f32);
             }
         }
@@ -209,35 +209,10 @@ impl SigmaLookup {
         let (i, s) = cell((z - z0) / (z1 - z0).max(f32::MIN_POSITIVE), DEPTHS);
         let share = (theta / steepest).clamp(0.0, 1.0);
         let (j, t) = cell(1.0 - (1.0 - share).sqrt(), TILTS);
-        let node = |i: usize, j: usize| self.nodes[i * TILTS + j];
+        let node = |i: usize, j: usize| self.nodes[j * DEPTHS + i];
         let near = node(i, j) + t * (node(i, j + 1) - node(i, j));
         let far = node(i + 1, j) + t * (node(i + 1, j + 1) - node(i + 1, j));
         near + s * (far - near)
-    }
-
-    /// The sigmas of a surface that is faced squarely, in a row: quicker to look up than among all tilts.
-    pub fn facing(&self) -> FacingLookup {
-        FacingLookup {
-            z_m: self.domain.z_m,
-            nodes: self.nodes.iter().step_by(TILTS).copied().collect(),
-        }
-    }
-}
-
-/// [`SigmaLookup::at`] a tilt of 0, to the last bit.
-#[derive(Debug, Clone)]
-pub struct FacingLookup {
-    z_m: [f64; 2],
-    nodes: Vec<f32>,
-}
-
-impl FacingLookup {
-    /// Sigma, m, at depth `z` (m).
-    #[inline]
-    pub fn at(&self, z: f32) -> f32 {
-        let [z0, z1] = self.z_m.map(|v| v as f32);
-        let (i, s) = cell((z - z0) / (z1 - z0).max(f32::MIN_POSITIVE), DEPTHS);
-        self.nodes[i] + s * (self.nodes[i + 1] - self.nodes[i])
     }
 }
 
@@ -285,8 +260,6 @@ mod tests {
                         (f64::from(table.at(z as f32, theta as f32)), model.axial_sigma(z, theta));
                     assert!((found / truth - 1.0).abs() < 0.01, "{z} {theta}: {found} {truth}");
                 }
-                let z = 0.1 * i as f32;
-                assert_eq!(table.facing().at(z), table.at(z, 0.0));
             }
         }
     }
