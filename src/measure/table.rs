@@ -108,7 +108,7 @@ type Column = (&'static str, fn(&ViewMeasurement, &Cell) -> String);
 
 /// Programs go by the names (`crate::docs::layouts`).
 const COLUMNS: [Column; 30] = [
-    ("view", |m, _| quoted(&m.name)),
+    ("view", |m, _| m.name.clone()),
     ("z_m", |_, cell| number(cell.z_m)),
     ("theta_rad", |m, _| number(m.theta_rad)),
     ("azimuth_rad", |m, _| number(m.azimuth_rad)),
@@ -142,14 +142,13 @@ const COLUMNS: [Column; 30] = [
 
 /// measurements.csv: a row a cell, SI units, empty where a statistic cannot be had.
 pub fn write_measurements(views: &[ViewMeasurement]) -> String {
-    let mut text = COLUMNS.map(|(name, _)| name).join(",") + "\n";
-    for m in views {
-        for cell in &m.cells {
-            text += &COLUMNS.map(|(_, value)| value(m, cell)).join(",");
-            text.push('\n');
-        }
+    // Writing to memory does not fail.
+    let mut table = ::csv::Writer::from_writer(Vec::new());
+    let _ = table.write_record(COLUMNS.map(|(name, _)| name));
+    for (m, cell) in views.iter().flat_map(|m| m.cells.iter().map(move |cell| (m, cell))) {
+        let _ = table.write_record(COLUMNS.map(|(_, value)| value(m, cell)));
     }
-    text
+    String::from_utf8(table.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
 /// Shortest text that reads back to the same number; empty for what is not one.
@@ -163,15 +162,6 @@ fn optional(v: Option<f64>) -> String {
 
 fn of_budget(m: &ViewMeasurement, of: impl Fn(&Budget) -> Option<f64>) -> String {
     optional(m.distance_budget.as_ref().and_then(of))
-}
-
-/// View names are folder names and may hold commas or quotes.
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", name.replace('"', "\"\""))
-    } else {
-        name.to_string()
-    }
 }
 
 const REMEDY_TABLE: &str = "the header is z_m,theta_rad,sigma_m and optionally n, SI units";
