@@ -9,8 +9,11 @@ pub mod mixing;
 pub mod scan;
 pub mod shadow;
 
-/// Pixels of the target that are looked at, from its edge inwards.
-pub const INSIDE_PX: usize = 12;
+/// Pixels of the target that are looked at, from its edge inwards: beside a smooth bias, three columns a view, the
+/// last pixel of 24 keeps .68 of what it tells, of 12 .45; a footprint of 4 px .27 and .05.
+pub const INSIDE_PX: usize = 24;
+/// Where the target is narrow, this many.
+const MIN_INSIDE_PX: usize = 12;
 
 /// Sums over the crossings at one distance from the edge.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -43,6 +46,8 @@ struct Crossing {
     stride: isize,
     /// Disparity of what is behind less that of the plane, px.
     step: f64,
+    /// Pixels of the target, the last among them.
+    inside: usize,
     /// Left or right of the target with room for its shadow.
     side: Option<usize>,
 }

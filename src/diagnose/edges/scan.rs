@@ -1,6 +1,6 @@
 //! Where the lines of a picture cross the target's edge, and what they show there.
 
-use super::{Crossing, Edges, INSIDE_PX};
+use super::{Crossing, Edges, INSIDE_PX, MIN_INSIDE_PX};
 use crate::camera::Rays;
 use crate::diagnose::views::field::Field;
 use crate::frame::{DepthTable, Frame};
@@ -57,7 +57,7 @@ impl Edges {
         let fair = usize::from(self.frames == 1);
         let depth = |i: isize| f64::from(table.metres(frame.raw[i as usize]));
         for c in &self.crossings {
-            for (n, sums) in self.inside.iter_mut().enumerate().skip(fair) {
+            for (n, sums) in self.inside[..c.inside].iter_mut().enumerate().skip(fair) {
                 let i = c.last - n as isize * c.stride;
                 // Depth mixes, not disparity: the share of the step in depth, times the step in px.
                 let (own, seen) = (field.plane_at(i as usize, rays), field.scale_px_m / depth(i));
@@ -138,9 +138,10 @@ impl EdgeScan<'_> {
         };
         let last = (-farthest..=behind as isize).rev().find(nearer)?;
         let step = there - self.plane(at(last)?);
-        let inside = last - INSIDE_PX as isize + 1;
-        let in_region = |n: isize| at(n).is_some_and(|i| self.on[i as usize]);
-        if step > -STEP_SIGMAS * sigma || inside > 0 || !(inside..=last.min(0)).all(in_region) {
+        let on_target = |n: &isize| *n > 0 || at(*n).is_some_and(|i| self.on[i as usize]);
+        let inside = (0..INSIDE_PX as isize).map(|n| last - n).take_while(on_target).count();
+        let reaches_the_region = last < MIN_INSIDE_PX as isize;
+        if step > -STEP_SIGMAS * sigma || inside < MIN_INSIDE_PX || !reaches_the_region {
             return None;
         }
         let room = last + (shadow_px(step) + fringe_px(self.field.width) + BEYOND_PX) as isize;
@@ -150,7 +151,7 @@ impl EdgeScan<'_> {
             _ => None,
         };
         let side = side.filter(|_| at(room).is_some() && (1..=room).all(|n| off(n).is_some()));
-        Some(Crossing { last: at(last)?, stride, step, side })
+        Some(Crossing { last: at(last)?, stride, step, inside, side })
     }
 
     fn plane(&self, i: isize) -> f64 {
