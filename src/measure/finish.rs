@@ -83,7 +83,7 @@ impl Scan<'_> {
                 w[i as usize] = (1.0 / (f64::from(self.expected[k]) + mean)) as f32;
             }
         }
-        let floor = 0.1 * self.bench.step(self.plane.q.z.abs());
+        let floor = 0.1 * self.step(self.plane.q.z.abs());
         fit_affine_robust(
             &w,
             &self.bench.rays,

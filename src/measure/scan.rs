@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::grouping::{CUT_SIGMAS, by_cell, settled_scale};
+use super::grouping::{CUT_SIGMAS, by_cell, settled_scale, words_a_step};
 use super::{Planes, Workbench};
 use crate::frame::Frame;
 use crate::plane::{Plane, Target};
@@ -18,6 +18,8 @@ pub(super) struct Scan<'a> {
     /// First index into `pixels` of each cell, and the end.
     pub(super) starts: Vec<usize>,
     pub(super) plane: Plane,
+    /// See [`words_a_step`].
+    pub(super) words_a_step: f64,
     /// Expected depth, m, pixel by pixel of `pixels`.
     pub(super) expected: Vec<f32>,
     /// Greatest residual kept in each cell, m.
@@ -48,6 +50,8 @@ impl<'a> Scan<'a> {
         let (pixels, starts) = by_cell(&target.pixels, &plane, bench);
         let cells = starts.len() - 1;
         let n = pixels.len();
+        let words = held.iter().flat_map(|frame| pixels.iter().map(|&i| frame.raw[i as usize]));
+        let words_a_step = words_a_step(words.filter(|&raw| bench.table.metres(raw).is_finite()));
         let expected = |&i: &u32| plane.depth_at(&bench.rays, i as usize) as f32;
         let mut scan = Scan {
             bench,
@@ -55,6 +59,7 @@ impl<'a> Scan<'a> {
             pixels,
             starts,
             plane,
+            words_a_step,
             cut: vec![0.0; cells],
             count: vec![0; n],
             sum: vec![0.0; n],
@@ -90,10 +95,15 @@ impl<'a> Scan<'a> {
         }
     }
 
+    /// Step of the sensor at inverse depth `w`, 1/m.
+    pub(super) fn step(&self, w: f64) -> f64 {
+        self.words_a_step * self.bench.step(w)
+    }
+
     /// A fronto-parallel plane in a coarse code may show no spread at all.
     fn min_scale(&self, cell: usize) -> f64 {
         let z = f64::from(self.expected[self.starts[cell]]);
-        0.3 * self.bench.step(1.0 / z) * z * z
+        0.3 * self.step(1.0 / z) * z * z
     }
 
     #[inline]

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::budget::distance_budget;
+use super::grouping::words_a_step;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
 use crate::error::{Error, Result};
@@ -140,11 +141,13 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
             *w /= (1.0 - bench.ray_share * (1.0 - foreshortening)) as f32;
         }
     }
+    let words = held.iter().flat_map(|frame| frame.raw.iter().copied());
+    let words_a_step = words_a_step(words.filter(|&raw| bench.table.metres(raw).is_finite()));
     let image = InverseDepthImage {
         w: &w,
         rays: &bench.rays,
         camera: &bench.sensor.camera,
-        step: &|w| bench.step(w),
+        step: &|w| words_a_step * bench.step(w),
     };
     let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
     let remedy = "give the target's region in view.json (roi or polygon), or record the view again";
