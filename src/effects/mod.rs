@@ -61,7 +61,7 @@ pub trait Effect: Carded + Send + Sync {
     }
 
     /// Can a shape with these coefficients be meant, with what is stated of the target?
-    fn agrees_with(&self, _flat: &Flat, _shape: &Basis, _coefficients: &[f64]) -> bool {
+    fn agrees_with(&self, _flat: Option<&Flat>, _shape: &Basis, _coefficients: &[f64]) -> bool {
         true
     }
 

@@ -45,6 +45,14 @@ impl Effect for RangeNotDepth {
         1.0
     }
 
+    /// More than all of it is another bowl, and so is less than none, where it is not all that is known to be there
+    /// and is not.
+    fn agrees_with(&self, _: Option<&Flat>, _: &Basis, coefficients: &[f64]) -> bool {
+        coefficients.iter().all(|&share| {
+            (-SHARE_ERROR..=1.0 + SHARE_ERROR).contains(&share) || (share + 1.0).abs() <= SHARE_ERROR
+        })
+    }
+
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         vec![fit.estimate("share", &|b| b[0])]
     }
@@ -58,5 +66,20 @@ impl Effect for RangeNotDepth {
     }
 }
 
+/// A share that was fitted is off by this, beside another cause or by the formula's own error.
+const SHARE_ERROR: f64 = 0.1;
+
 /// What the disparity falls short by where the ray is taken for the depth.
 pub const RAY_FOR_DEPTH: Basis = Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bowl_that_no_ray_makes_is_another() {
+        let meant = |share| RangeNotDepth.agrees_with(None, &RAY_FOR_DEPTH, &[share]);
+        assert!([0.05, 0.5, 1.0, 1.05, -1.0].into_iter().all(meant));
+        assert!(![1.4, -0.5, -1.4].into_iter().any(meant));
+    }
+}

@@ -74,8 +74,10 @@ impl Effect for TargetBow {
         bow_m / half_m.powi(degree)
     }
 
-    fn agrees_with(&self, flat: &Flat, shape: &Basis, coefficients: &[f64]) -> bool {
-        relief_m(flat, shape, coefficients) <= BEYOND_STATED * flat.flatness_m
+    fn agrees_with(&self, flat: Option<&Flat>, shape: &Basis, coefficients: &[f64]) -> bool {
+        flat.is_none_or(|flat| {
+            relief_m(flat, shape, coefficients) <= BEYOND_STATED * flat.flatness_m
+        })
     }
 
     /// Over the reach of the board that was seen, along the side that is bent more; of a dome along the
@@ -156,7 +158,7 @@ mod tests {
         assert!((relief - 0.005).abs() < 1e-12, "{relief}");
         let twist = relief_m(&FLAT, &Basis::relief(2), &[0.0, 0.0, 0.01]);
         assert!((twist - 2.0 * 0.01 * 0.5 * 0.4).abs() < 1e-12, "{twist}");
-        let agrees = |sagitta| TargetBow.agrees_with(&FLAT, &Basis::relief(2), &bent(sagitta));
+        let agrees = |sagitta| TargetBow.agrees_with(Some(&FLAT), &Basis::relief(2), &bent(sagitta));
         assert!(agrees(0.0002) && agrees(-0.0003));
         assert!(!agrees(0.005) && !agrees(-0.005));
     }

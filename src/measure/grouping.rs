@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn steps_of_the_sensor_are_met_in_its_words() {
         let mut rng = Seed(3).stream("words");
-        for step in [1.0, 6.47] {
+        for step in [1.0f64, 6.47] {
             for n in [300, 20_000] {
                 let noise = Normal::new(0.0, 0.5 * step.max(6.0)).unwrap();
                 let mut words: Vec<u16> = (0..n)

@@ -1,4 +1,4 @@
-//! What is stated of the target's flatness, in a diagnosis.
+//! Targets that are bent, and bowls: how much of them, and what is stated of the target's flatness.
 
 use kinoise::diagnose::{DiagnoseOptions, diagnose};
 use kinoise::effects::Active;
@@ -47,4 +47,33 @@ fn a_board_that_is_stated_to_be_flat_is_not_called_bent() {
         *effect == Some(BOW) || others.contains(&BOW)
     };
     assert!(!found.iter().any(mentions), "{found:?}");
+}
+
+/// The stronger, the surer: a bowl of ten times the noise is not taken for noise that hangs together, neither
+/// in a tiny picture nor in one that it bends by pixels.
+#[test]
+fn a_bowl_does_not_hide_itself() {
+    let poses = Grid { distances_m: vec![1.0, 1.5, 2.0, 3.0], tilts_rad: vec![0.0, 0.5, 1.0] };
+    for (shrink, effect) in [
+        (8, "target-bow:sagitta_m=0.005"),
+        (8, "target-bow:sagitta_m=0.03"),
+        (8, "radial-disparity-bias:k_px=0.1"),
+        (8, "radial-disparity-bias:k_px=1"),
+        (2, "radial-disparity-bias:k_px=4"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let sigma = SigmaModel::paper();
+        let board = Target::Board(Board { width_m: 1.0, height_m: 0.8 });
+        let mut shoot =
+            Shoot::plain(kinect_v1(shrink), board, &poses.views(), 4, sigma.clone(), Seed(12));
+        let effects = vec![Active::parse(effect).expect("an effect")];
+        shoot.physics = Physics::Formula { sigma, effects };
+        shoot.write(folder.path(), &|_, _| ()).expect("written");
+        let recording = open(folder.path(), &Assumed::default()).expect("a recording");
+        let options = DiagnoseOptions::default();
+        let found = diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ());
+        let findings = found.expect("diagnosed").diagnosis.findings;
+        let first = findings.first().and_then(|f| f.effect);
+        assert_eq!(first, effect.split(':').next(), "{shrink}, {effect}");
+    }
 }

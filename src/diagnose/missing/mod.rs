@@ -124,7 +124,11 @@ impl DropoutSearch<'_> {
     fn losses(&self, seen: &DropoutCells<'_>) -> DropoutOutcome {
         let views = &seen.cells;
         let mut outcome = DropoutOutcome::default();
-        if views.iter().filter(|v| !v.is_empty()).count() < MIN_VIEWS {
+        let count = views.iter().filter(|v| !v.is_empty()).count();
+        if count < MIN_VIEWS {
+            outcome.notes.push(format!(
+                "what is lost could not be tested: {count} views show enough of a target, and {MIN_VIEWS} are needed"
+            ));
             return outcome;
         }
         let shapes = Shapes::of(self.reach, self.camera, times(views));

@@ -229,6 +229,16 @@ fn a_hard_end_of_the_range_is_a_note() {
     assert!(outcome.notes.len() == 1 && outcome.notes[0].contains("2.2"), "{:?}", outcome.notes);
 }
 
+/// Three views show no rule: that is said, and not that there is none.
+#[test]
+fn too_few_views_are_told() {
+    let mut rng = Seed(7).stream("few");
+    let (views, camera) = session(0.002, &mut rng, |_| 0.3);
+    let outcome = find(&views[..3], &camera, Seed(7));
+    assert!(outcome.findings.is_empty());
+    assert!(outcome.notes.iter().any(|n| n.contains("3 views")), "{:?}", outcome.notes);
+}
+
 /// The same distances lose nothing before.
 #[test]
 fn what_begins_in_the_midst_of_the_session_is_told_with_its_time() {

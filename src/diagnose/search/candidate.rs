@@ -66,9 +66,9 @@ impl Candidate {
         self.effect().map_or(USUAL_PX, |e| e.usual(&self.basis, k, self.flat.as_ref()))
     }
 
-    /// Does a fit of it agree with what is stated of the target?
+    /// Does a fit of it agree with what its cause can do, and with what is stated of the target?
     pub fn agrees(&self, coefficients: &[f64]) -> bool {
-        let (Some(flat), Some(effect)) = (&self.flat, self.effect()) else { return true };
-        effect.agrees_with(flat, &self.basis, coefficients)
+        let agrees = |e: &dyn Effect| e.agrees_with(self.flat.as_ref(), &self.basis, coefficients);
+        self.effect().is_none_or(agrees)
     }
 }
