@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::io::{hex, sha256_hex};
 use crate::measure::{
     MeasureOptions, Planes, ReferenceDistance, SigmaKind, SigmaTable, ViewMeasurement, Workbench,
-    measure_view, ranges_remark,
+    measure_view, ranges_remark, without_copies,
 };
 use crate::model::{
     Direction, FitSummary, Form, HeldOut, NoiseModel, Provenance, SigmaFit, SigmaModel,
@@ -65,7 +65,8 @@ pub struct Calibration {
     pub warnings: Vec<String>,
 }
 
-/// Measure every view. A view without a plane is excluded, with its reason; `progress` counts views.
+/// Measure every view. A view without a plane is excluded, with its reason, and so is a copy of another: it would
+/// count as one more measurement. `progress` counts views.
 /// An error when no view can be measured at all; the message gives the first reason.
 pub fn measure(
     recording: &Recording,
@@ -73,7 +74,9 @@ pub fn measure(
     progress: Progress<'_>,
 ) -> Result<Measurements> {
     let bench = Workbench::new(&recording.sensor, *options);
-    let (views, excluded) = recording.each_view(progress, |view| measure_view(view, &bench));
+    let (mut views, mut excluded) =
+        recording.each_view(progress, |view| measure_view(view, &bench));
+    excluded.extend(without_copies(recording, &mut views));
     let ranges = ranges_remark(recording, &excluded, &bench);
     let (measurements, total) = (Measurements { views, excluded, ranges }, recording.views.len());
     if measurements.views.is_empty() {

@@ -45,8 +45,8 @@ impl Effect for RangeNotDepth {
         1.0
     }
 
-    /// More than all of it is another bowl, and so is less than none, where it is not all that is known to be there
-    /// and is not.
+    /// A share lies between 0 and 1; or it is -1, where the model takes all of it to be there and the sensor has
+    /// none. Anything else is another bowl.
     fn agrees_with(&self, _: Option<&Flat>, _: &Basis, coefficients: &[f64]) -> bool {
         coefficients.iter().all(|&share| {
             (-SHARE_ERROR..=1.0 + SHARE_ERROR).contains(&share) || (share + 1.0).abs() <= SHARE_ERROR

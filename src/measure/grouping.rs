@@ -47,11 +47,15 @@ pub(super) fn by_cell(
 
 /// Words from one step of the sensor to the next: 1 where every word occurs; more where a driver stores, as
 /// millimetres, what steps by an eighth of a pixel. The lower quartile of the gaps between words that occur,
-/// each as often as the rarer of its two: gaps between surfaces count for nothing.
+/// each as often as the rarer of its two: gaps between surfaces count for little. Of two words that may be two
+/// surfaces no step is told.
 pub(super) fn words_a_step(words: impl Iterator<Item = u16>) -> f64 {
     let mut counts = vec![0u64; 1 << 16];
     words.for_each(|word| counts[usize::from(word)] += 1);
     let seen: Vec<usize> = (0..counts.len()).filter(|&word| counts[word] > 0).collect();
+    if seen.len() < 3 {
+        return 1.0;
+    }
     let gap = |pair: &[usize]| (pair[1] - pair[0], counts[pair[0]].min(counts[pair[1]]));
     let mut gaps: Vec<(usize, u64)> = seen.windows(2).map(gap).collect();
     gaps.sort_unstable();
@@ -96,13 +100,13 @@ mod tests {
     use crate::rng::Seed;
     use rand_distr::{Distribution, Normal};
 
-    /// Of a wall at 1.5 m in a wide room, in millimetres, with noise of half a step.
+    /// Of a wall at 1.5 m in a wide room, in millimetres, with noise of 3 mm, half of a coarse step.
     #[test]
     fn steps_of_the_sensor_are_met_in_its_words() {
         let mut rng = Seed(3).stream("words");
         for step in [1.0f64, 6.47] {
             for n in [300, 20_000] {
-                let noise = Normal::new(0.0, 0.5 * step.max(6.0)).unwrap();
+                let noise = Normal::new(0.0, 3.0).unwrap();
                 let mut words: Vec<u16> = (0..n)
                     .map(|_| {
                         (step * (noise.sample(&mut rng) / step).round() + 1500.0).round() as u16
@@ -114,5 +118,7 @@ mod tests {
             }
         }
         assert_eq!(words_a_step([1500; 9].into_iter()), 1.0, "one word tells no step");
+        let board_and_wall = [[1000; 9], [1100; 9]].concat();
+        assert_eq!(words_a_step(board_and_wall.into_iter()), 1.0, "nor do two surfaces");
     }
 }

@@ -17,7 +17,7 @@ pub use budget::flatness_uncertainty_m;
 pub use cells::{Cell, Spread};
 pub use column_steps::ColumnSteps;
 pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
-pub use view::{measure_view, ranges_remark, view_target};
+pub use view::{measure_view, ranges_remark, view_target, without_copies};
 
 use crate::camera::Rays;
 use crate::frame::DepthTable;
@@ -57,6 +57,10 @@ impl Default for MeasureOptions {
     }
 }
 
+/// Words that lie farther apart than this, 1/m, are no step of a sensor: twice an eighth of a pixel of a Kinect,
+/// whose disparity is 43.5 px at 1 m.
+const COARSEST_STEP: f64 = 2.0 * 0.125 / 43.5;
+
 /// What every view of a recording shares: computed once.
 #[derive(Debug)]
 pub struct Workbench<'a> {
@@ -80,9 +84,10 @@ impl<'a> Workbench<'a> {
         }
     }
 
-    /// Step of the depth code at inverse depth `w`, 1/m.
-    fn step(&self, w: f64) -> f64 {
-        if w > 0.0 { self.sensor.code.step_inverse(1.0 / w) } else { 0.0 }
+    /// Step of so many words of the depth code at inverse depth `w`, 1/m.
+    fn step(&self, words: f64, w: f64) -> f64 {
+        let one = if w > 0.0 { self.sensor.code.step_inverse(1.0 / w) } else { 0.0 };
+        one.max(f64::min(words * one, COARSEST_STEP))
     }
 }
 

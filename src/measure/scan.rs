@@ -97,7 +97,7 @@ impl<'a> Scan<'a> {
 
     /// Step of the sensor at inverse depth `w`, 1/m.
     pub(super) fn step(&self, w: f64) -> f64 {
-        self.words_a_step * self.bench.step(w)
+        self.bench.step(self.words_a_step, w)
     }
 
     /// A fronto-parallel plane in a coarse code may show no spread at all.

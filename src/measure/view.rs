@@ -84,6 +84,28 @@ pub fn ranges_remark(
     })
 }
 
+/// Drops views of the same region in the same frames as a view before, and tells which.
+pub fn without_copies(recording: &Recording, views: &mut Vec<ViewMeasurement>) -> Vec<Excluded> {
+    let region = |name: &str| {
+        recording.views.iter().find(|v| v.name == name).and_then(|v| v.notes.region.as_ref())
+    };
+    let mut copies = Vec::new();
+    let mut kept: Vec<ViewMeasurement> = Vec::new();
+    for view in views.drain(..) {
+        let same =
+            |k: &&ViewMeasurement| k.digest == view.digest && region(&k.name) == region(&view.name);
+        match kept.iter().find(same) {
+            Some(first) => copies.push(Excluded {
+                reason: format!("it has the same frames as view {}", first.name),
+                view: view.name,
+            }),
+            None => kept.push(view),
+        }
+    }
+    *views = kept;
+    copies
+}
+
 /// Hands out the frames that can be read; the others are named in the notes.
 struct FrameReader<'r> {
     frames: std::iter::Enumerate<std::slice::Iter<'r, FrameRef>>,
@@ -147,7 +169,7 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
         w: &w,
         rays: &bench.rays,
         camera: &bench.sensor.camera,
-        step: &|w| words_a_step * bench.step(w),
+        step: &|w| bench.step(words_a_step, w),
     };
     let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
     let remedy = "give the target's region in view.json (roi or polygon), or record the view again";

@@ -261,3 +261,28 @@ fn threads_languages_and_time_zones_change_no_byte() {
         same(&plain, &results(folder.path(), &[command, "rec", "--threads", "2"], &elsewhere));
     }
 }
+
+/// A view that was stored twice is one measurement: the coefficients are no surer for it.
+#[test]
+fn a_copy_of_a_view_is_no_other_view() {
+    let folder = tempfile::tempdir().expect("a folder");
+    copy_tree(good(), folder.path());
+    let calibrated = || {
+        let recording = io::open(folder.path(), &io::Assumed::default()).expect("a recording");
+        let options = CalibrateOptions::default();
+        let measured =
+            measure_recording(&recording, &options.measure, &|_, _| ()).expect("measured");
+        let model = model_of(&recording, &measured, &options).expect("a model");
+        (measured.excluded, model.fit)
+    };
+    let (none, once) = calibrated();
+    for view in ["0003", "0007"] {
+        copy_tree(&folder.path().join(view), &folder.path().join(format!("9{view}")));
+    }
+    let (copies, twice) = calibrated();
+    assert!(none.is_empty());
+    let told: Vec<String> = copies.iter().map(|e| format!("{}: {}", e.view, e.reason)).collect();
+    let same = |view: &str| format!("9{view}: it has the same frames as view {view}");
+    assert_eq!(told, ["0003", "0007"].map(same));
+    assert_eq!(once, twice);
+}

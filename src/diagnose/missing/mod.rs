@@ -127,7 +127,7 @@ impl DropoutSearch<'_> {
         let count = views.iter().filter(|v| !v.is_empty()).count();
         if count < MIN_VIEWS {
             outcome.notes.push(format!(
-                "what is lost could not be tested: {count} views show enough of a target, and {MIN_VIEWS} are needed"
+                "what is lost could not be tested: {MIN_VIEWS} views of a target are needed, and {count} can be used"
             ));
             return outcome;
         }

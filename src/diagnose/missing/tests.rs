@@ -236,7 +236,7 @@ fn too_few_views_are_told() {
     let (views, camera) = session(0.002, &mut rng, |_| 0.3);
     let outcome = find(&views[..3], &camera, Seed(7));
     assert!(outcome.findings.is_empty());
-    assert!(outcome.notes.iter().any(|n| n.contains("3 views")), "{:?}", outcome.notes);
+    assert!(outcome.notes.iter().any(|n| n.contains("and 3 can be used")), "{:?}", outcome.notes);
 }
 
 /// The same distances lose nothing before.

@@ -1,6 +1,8 @@
-//! Sums over boxes of an image, and what is left of it without their mean.
+//! Sums over boxes of an image, and what is left of it without their mean, or without a cubic.
 
-use crate::stats::{MAD_TO_SIGMA, median_in_place};
+use nalgebra::{SMatrix, SVector};
+
+use crate::stats::{MAD_TO_SIGMA, median_in_place, range};
 
 /// Side of the box whose mean is taken out, px: several windows, and less than a lens's bowl.
 pub const SMOOTH_PX: usize = 49;
@@ -67,6 +69,39 @@ pub fn high_pass(image: &[f32], width: usize, side: usize) -> Vec<f32> {
         }
     });
     left
+}
+
+/// So many pixels are enough for the ten coefficients of a cubic: they add 1 / 200 of the noise's variance.
+const FITTED: usize = 2000;
+
+/// Takes out the cubic in column and row that fits best; one value of each of the `pixels`.
+pub fn take_out_cubic(values: &mut [f32], pixels: &[u32], width: usize) {
+    let at = |i: u32| [i as usize % width, i as usize / width].map(|at| at as f64);
+    let ranges = [0, 1].map(|k| range(pixels.iter().map(|&i| at(i)[k])));
+    let columns = |i: u32| {
+        let place = at(i);
+        let [x, y] = [0, 1].map(|k| {
+            let [low, high] = ranges[k];
+            (2.0 * place[k] - low - high) / (high - low).max(1.0)
+        });
+        let (xx, xy, yy) = (x * x, x * y, y * y);
+        SVector::from([1.0, x, y, xx, xy, yy, xx * x, xx * y, x * yy, y * yy])
+    };
+    let limit = gross_limit(values);
+    let (mut normal, mut cross) = (SMatrix::<f64, 10, 10>::zeros(), SVector::<f64, 10>::zeros());
+    // Odd, so that even and odd columns are met alike.
+    let stride = (pixels.len() / FITTED) | 1;
+    for (&i, r) in pixels.iter().zip(&*values).step_by(stride) {
+        if r.abs() <= limit {
+            let columns = columns(i);
+            normal += columns * columns.transpose();
+            cross += columns * f64::from(*r);
+        }
+    }
+    let Some(cubic) = normal.cholesky().map(|c| c.solve(&cross)) else { return };
+    for (&i, r) in pixels.iter().zip(values) {
+        *r -= columns(i).dot(&cubic) as f32;
+    }
 }
 
 /// Beyond this an error is gross: six robust standard deviations of what is there about nothing. None is where most

@@ -2,14 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, SVector};
-
-use super::box_sums::gross_limit;
+use super::box_sums::take_out_cubic;
 use super::field::Field;
 use super::samples::{ViewData, finite};
 use super::tiles::Tile;
 use crate::diagnose::noise::texture::{same_pixel, without_bias};
-use crate::stats::{Correlation, measure_correlation, range};
+use crate::stats::{Correlation, measure_correlation};
 use crate::terms::PixelContext;
 
 /// A view, thinned.
@@ -52,41 +50,10 @@ pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
 /// Whitened residuals as an image, without what is smooth.
 fn whitened_high_passed(residuals: &[f32], field: &Field) -> Vec<f32> {
     let mut whitened: Vec<f32> = residuals.iter().zip(&field.sigma).map(|(r, s)| r / s).collect();
-    take_out_cubic(&mut whitened, field);
+    // Where the box is not small beside the target it leaves most of a bowl, which would count as noise that hangs
+    // together: the stronger, the less of it would be seen.
+    take_out_cubic(&mut whitened, &field.pixels, field.width);
     field.high_passed(&whitened)
-}
-
-/// Of so many pixels one, which is enough for ten coefficients.
-const THINNED: usize = 7;
-
-/// Takes out the cubic over the target that fits best. Where the box of [`Field::high_passed`] is not small beside the
-/// target it leaves most of a bowl, which would count as noise that hangs together: the stronger, the less
-/// of it would be seen.
-fn take_out_cubic(values: &mut [f32], field: &Field) {
-    let at = |i: u32| [i as usize % field.width, i as usize / field.width].map(|at| at as f64);
-    let ranges = [0, 1].map(|k| range(field.pixels.iter().map(|&i| at(i)[k])));
-    let columns = |i: u32| {
-        let place = at(i);
-        let [x, y] = [0, 1].map(|k| {
-            let [low, high] = ranges[k];
-            (2.0 * place[k] - low - high) / (high - low).max(1.0)
-        });
-        let (xx, xy, yy) = (x * x, x * y, y * y);
-        SVector::from([1.0, x, y, xx, xy, yy, xx * x, xx * y, x * yy, y * yy])
-    };
-    let limit = gross_limit(values);
-    let (mut normal, mut cross) = (SMatrix::<f64, 10, 10>::zeros(), SVector::<f64, 10>::zeros());
-    for (&i, r) in field.pixels.iter().zip(&*values).step_by(THINNED) {
-        if r.abs() <= limit {
-            let columns = columns(i);
-            normal += columns * columns.transpose();
-            cross += columns * f64::from(*r);
-        }
-    }
-    let Some(cubic) = normal.cholesky().map(|c| c.solve(&cross)) else { return };
-    for (&i, r) in field.pixels.iter().zip(values) {
-        *r -= columns(i).dot(&cubic) as f32;
-    }
 }
 
 /// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
