@@ -218,6 +218,22 @@ impl Excluded {
     }
 }
 
+/// Takes out views that are the `same` as one before them: each copy, and the place of that one among those kept.
+pub(crate) fn take_out_copies<T>(
+    views: &mut Vec<T>,
+    same: impl Fn(&T, &T) -> bool,
+) -> Vec<(T, usize)> {
+    let (mut kept, mut copies): (Vec<T>, Vec<(T, usize)>) = (Vec::new(), Vec::new());
+    for view in views.drain(..) {
+        match kept.iter().position(|k| same(k, &view)) {
+            Some(first) => copies.push((view, first)),
+            None => kept.push(view),
+        }
+    }
+    *views = kept;
+    copies
+}
+
 impl std::fmt::Display for Excluded {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "view {} was left out: {}", self.view, self.reason)

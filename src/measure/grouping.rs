@@ -2,6 +2,7 @@
 
 use super::Workbench;
 use super::cells::Bins;
+use crate::frame::DepthTable;
 use crate::plane::{MAD_TO_SIGMA, Plane};
 use crate::stats::{median_in_place, normal_cut_factor, range};
 
@@ -49,10 +50,11 @@ pub(super) fn by_cell(
 /// millimetres, what steps by an eighth of a pixel. The lower quartile of the gaps between words that occur,
 /// each as often as the rarer of its two: gaps between surfaces count for little. Of two words that may be two
 /// surfaces no step is told.
-pub(super) fn words_a_step(words: impl Iterator<Item = u16>) -> f64 {
+pub(super) fn words_a_step(words: impl Iterator<Item = u16>, table: &DepthTable) -> f64 {
     let mut counts = vec![0u64; 1 << 16];
     words.for_each(|word| counts[usize::from(word)] += 1);
-    let seen: Vec<usize> = (0..counts.len()).filter(|&word| counts[word] > 0).collect();
+    let is_depth = |&word: &usize| counts[word] > 0 && table.metres(word as u16).is_finite();
+    let seen: Vec<usize> = (0..counts.len()).filter(is_depth).collect();
     if seen.len() < 3 {
         return 1.0;
     }
@@ -97,6 +99,7 @@ pub(super) fn settled_scale(residuals: Vec<f32>, min_scale: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::DepthCode;
     use crate::rng::Seed;
     use rand_distr::{Distribution, Normal};
 
@@ -104,6 +107,7 @@ mod tests {
     #[test]
     fn steps_of_the_sensor_are_met_in_its_words() {
         let mut rng = Seed(3).stream("words");
+        let table = DepthCode::Metric { units_per_metre: 1000.0, invalid: 0 }.table();
         for step in [1.0f64, 6.47] {
             for n in [300, 20_000] {
                 let noise = Normal::new(0.0, 3.0).unwrap();
@@ -113,12 +117,12 @@ mod tests {
                     })
                     .collect();
                 words.extend([2047, 4000, 4100, 4107]);
-                let found = words_a_step(words.into_iter());
+                let found = words_a_step(words.into_iter(), &table);
                 assert!((found - step).abs() < 1.0, "{step}: {found}");
             }
         }
-        assert_eq!(words_a_step([1500; 9].into_iter()), 1.0, "one word tells no step");
+        assert_eq!(words_a_step([1500; 9].into_iter(), &table), 1.0, "one word tells no step");
         let board_and_wall = [[1000; 9], [1100; 9]].concat();
-        assert_eq!(words_a_step(board_and_wall.into_iter()), 1.0, "nor do two surfaces");
+        assert_eq!(words_a_step(board_and_wall.into_iter(), &table), 1.0, "nor do two surfaces");
     }
 }

@@ -51,7 +51,7 @@ impl<'a> Scan<'a> {
         let cells = starts.len() - 1;
         let n = pixels.len();
         let words = held.iter().flat_map(|frame| pixels.iter().map(|&i| frame.raw[i as usize]));
-        let words_a_step = words_a_step(words.filter(|&raw| bench.table.metres(raw).is_finite()));
+        let words_a_step = words_a_step(words, &bench.table);
         let expected = |&i: &u32| plane.depth_at(&bench.rays, i as usize) as f32;
         let mut scan = Scan {
             bench,

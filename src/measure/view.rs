@@ -12,7 +12,7 @@ use crate::io::{FrameSource, InfraredImage};
 use crate::plane::{
     InverseDepthImage, Points, RansacOptions, RansacPlane, Target, find_target, ransac_plane,
 };
-use crate::view::{Excluded, FrameRef, Recording, View};
+use crate::view::{Excluded, FrameRef, Recording, View, take_out_copies};
 
 /// An error when no frame can be read or none shows a plane; others that cannot are notes.
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
@@ -89,21 +89,13 @@ pub fn without_copies(recording: &Recording, views: &mut Vec<ViewMeasurement>) -
     let region = |name: &str| {
         recording.views.iter().find(|v| v.name == name).and_then(|v| v.notes.region.as_ref())
     };
-    let mut copies = Vec::new();
-    let mut kept: Vec<ViewMeasurement> = Vec::new();
-    for view in views.drain(..) {
-        let same =
-            |k: &&ViewMeasurement| k.digest == view.digest && region(&k.name) == region(&view.name);
-        match kept.iter().find(same) {
-            Some(first) => copies.push(Excluded {
-                reason: format!("it has the same frames as view {}", first.name),
-                view: view.name,
-            }),
-            None => kept.push(view),
-        }
-    }
-    *views = kept;
-    copies
+    let copies =
+        take_out_copies(views, |a, b| a.digest == b.digest && region(&a.name) == region(&b.name));
+    let told = |(copy, first): (ViewMeasurement, usize)| {
+        let reason = format!("it has the same frames as view {}", views[first].name);
+        Excluded { view: copy.name, reason }
+    };
+    copies.into_iter().map(told).collect()
 }
 
 /// Hands out the frames that can be read; the others are named in the notes.
@@ -164,7 +156,7 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
         }
     }
     let words = held.iter().flat_map(|frame| frame.raw.iter().copied());
-    let words_a_step = words_a_step(words.filter(|&raw| bench.table.metres(raw).is_finite()));
+    let words_a_step = words_a_step(words, &bench.table);
     let image = InverseDepthImage {
         w: &w,
         rays: &bench.rays,

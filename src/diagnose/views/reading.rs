@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
 use crate::terms::{Axis, PixelContext, Pixels, Statistic, Term};
-use crate::view::{Excluded, Recording};
+use crate::view::{Excluded, Recording, take_out_copies};
 
 /// What could be read of a recording.
 pub(in crate::diagnose) struct LoadedViews<'a> {
@@ -77,25 +77,17 @@ impl<'a> LoadedViews<'a> {
 
 /// A view whose frames are bit-identical to another's is a duplicate and is dropped.
 fn without_copies(fields: &mut Vec<Field>) -> Vec<String> {
-    let mut told = Vec::new();
-    let mut kept: Vec<Field> = Vec::new();
-    for field in fields.drain(..) {
-        let same = |other: &&Field| {
-            other.words.0 == field.words.0
-                && other.frames.len() == field.frames.len()
-                && other.pixels == field.pixels
-                && other.first.first().map(|f| bits(f)) == field.first.first().map(|f| bits(f))
-        };
-        match kept.iter().find(same) {
-            Some(other) => told.push(format!(
-                "view {} has the same frames as view {}: it was left out",
-                field.name, other.name
-            )),
-            None => kept.push(field),
-        }
-    }
-    *fields = kept;
-    told
+    let copies = take_out_copies(fields, |a, b| {
+        a.words.0 == b.words.0
+            && a.frames.len() == b.frames.len()
+            && a.pixels == b.pixels
+            && a.first.first().map(|f| bits(f)) == b.first.first().map(|f| bits(f))
+    });
+    let told = |(copy, first): (Field, usize)| {
+        let first = &fields[first].name;
+        format!("view {} has the same frames as view {first}: it was left out", copy.name)
+    };
+    copies.into_iter().map(told).collect()
 }
 
 fn bits(residuals: &[f32]) -> Vec<u32> {
