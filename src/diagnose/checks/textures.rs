@@ -4,7 +4,6 @@
 use super::replication::agree;
 use crate::diagnose::edges::Edges;
 use crate::diagnose::edges::mixing::mean_share;
-use crate::diagnose::noise::expected_window;
 use crate::diagnose::noise::in_time::{later, of_any_two};
 use crate::diagnose::noise::mixture::Mixture;
 use crate::diagnose::noise::scatter::ScatterResult;
@@ -12,6 +11,7 @@ use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::noise::{ROW_NOISE, expected_window};
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
@@ -35,8 +35,8 @@ pub fn replicated(
         let mine = second.iter().enumerate().filter(|(_, s)| **s == which).map(|(v, _)| v);
         match &beyond {
             Some(of) => {
-                let views: Vec<Structure> = mine.map(|v| structure[v].clone()).collect();
-                ViewMean::of(&views, of)
+                let values = mine.filter_map(|v| sized(found, of, &structure[v]));
+                ViewMean::weighed(&values.collect::<Vec<_>>())
             }
             None if found.axis == Axis::EdgeDistance => {
                 let edges: Vec<&Edges> = mine.map(|v| &fields[v].edges).collect();
@@ -59,10 +59,7 @@ pub fn gained(
     let named = textures.iter().filter(|t| !t.families.is_empty());
     for texture in named.chain(tails).filter(|t| t.of_some.is_none()) {
         let Some(beyond) = beyond_known(texture, known) else { continue };
-        let of = |&v: &usize| {
-            let s = &structure[v];
-            Some((beyond(s).filter(|x| x.is_finite())?, s.pixels))
-        };
+        let of = |&v: &usize| sized(texture, &beyond, &structure[v]);
         let learnt_on: Vec<(f64, f64)> = rest.iter().filter_map(of).collect();
         for (gain, view) in gains.iter_mut().zip(aside) {
             let nats = of(view).and_then(|own| ViewMean::predicts(&learnt_on, own));
@@ -70,6 +67,16 @@ pub fn gained(
         }
     }
     gains
+}
+
+/// A view's value with what it counts by, as for the finding.
+fn sized(found: &TextureFinding, beyond: &OfView, s: &Structure) -> Option<(f64, f64)> {
+    let size = match (found.families.first().copied(), found.axis, found.statistic) {
+        (Some(ROW_NOISE), ..) => s.line_error_px2(0).powi(-2),
+        (None, Axis::Column, Statistic::Correlation) => s.line_error_px2(1).powi(-2),
+        _ => s.pixels,
+    };
+    Some((beyond(s).filter(|x| x.is_finite())?, size))
 }
 
 /// What a finding is told by, view by view.

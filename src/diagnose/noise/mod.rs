@@ -94,19 +94,27 @@ fn textures_of_some(
     found: &[TextureFinding],
 ) -> Vec<TextureFinding> {
     type OfView = fn(&Structure) -> Option<f64>;
+    type Error = fn(&Structure) -> f64;
     type OfAll = fn(&[Structure], &KnownTerms, f64) -> Vec<TextureFinding>;
     // Shares of a view's own variance, so that near and far views scatter alike.
-    let all: [(&[&str], OfView, OfAll); 3] = [
-        (&[ROW_NOISE], |s| Some(s.row_px2? / s.variance_px2), lines),
+    let all: [(&[&str], OfView, Error, OfAll); 3] = [
+        (
+            &[ROW_NOISE],
+            |s| Some(s.row_px2? / s.variance_px2),
+            |s| s.line_error_px2(0) / s.variance_px2,
+            lines,
+        ),
         // Rounding stands still: where it hides what neighbours share, frames are alike too.
         (
             &["frozen-noise", "temporal-correlation"],
             |s| s.neighbour_correlation.and(s.lagged[0]),
+            Structure::lagged_error,
             in_time,
         ),
         (
             &["spatial-correlation"],
             |s| s.neighbour_correlation,
+            Structure::neighbour_error,
             |views, known, level| window(views, known, level).into_iter().collect(),
         ),
     ];
@@ -115,9 +123,9 @@ fn textures_of_some(
         let found = found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
         found || ids.iter().any(|id| known.has(id))
     };
-    let of = |(ids, of_view, of_all): (&[&str], OfView, OfAll)| {
+    let of = |(ids, of_view, error, of_all): (&[&str], OfView, Error, OfAll)| {
         // The second test of each at this level.
-        let some = some_views(views, of_view).filter(|some| 2.0 * some.p < level)?;
+        let some = some_views(views, of_view, Some(error)).filter(|some| 2.0 * some.p < level)?;
         let shown = of_all(&some.views, known, AMONG_SOME).into_iter();
         let mut named = shown.filter(|f| f.families.iter().any(|id| ids.contains(id)));
         Some(named.next()?.of_some([some.views.len(), some.of], 2.0 * some.p))
@@ -228,12 +236,12 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
             "a fine pattern over the picture is the same in all views",
         ),
         (
-            ViewMean::of(views, |s| s.row_px2),
+            ViewMean::of_lines(views, 0),
             line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),
             1.0,
         ),
         (
-            ViewMean::of(views, |s| s.column_px2),
+            ViewMean::of_lines(views, 1),
             line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
             1.0,
         ),

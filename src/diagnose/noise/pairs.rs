@@ -27,6 +27,8 @@ pub struct Pairs {
     /// Of pixels of one row that lie apart, and of one column.
     pub row: Option<f64>,
     pub column: Option<f64>,
+    /// How many pairs these are of, in rows and in columns, each pair met twice.
+    pub line_pairs: [f64; 2],
     /// Of neighbours, without what rows and columns share.
     pub near: f64,
 }
@@ -54,18 +56,19 @@ impl Pairs {
                 sum = sum.and(along(pixels.clone().map(|i| f64::from(level[i]))));
                 leverage += plane.leverage_along(&level, pixels);
             }
-            (sum.pairs >= MIN_PAIRS).then(|| (sum.products + taken * leverage) / sum.pairs)
+            let products = (sum.products + taken * leverage) / sum.pairs;
+            ((sum.pairs >= MIN_PAIRS).then_some(products), sum.pairs)
         };
-        let row = lines(height, width, &|line, k| line * width + k);
-        let column = lines(width, height, &|line, k| k * width + line);
+        let (row, in_rows) = lines(height, width, &|line, k| line * width + k);
+        let (column, in_columns) = lines(width, height, &|line, k| k * width + line);
         let shared = (row.unwrap_or(0.0) + column.unwrap_or(0.0)) * ON_THE_LINE;
         let near = beside.products / beside.pairs + 3.0 * taken / pixels - shared;
-        Some(Pairs { power, row, column, near })
+        Some(Pairs { power, row, column, line_pairs: [in_rows, in_columns], near })
     }
 }
 
 /// Neighbours of a pixel, and the share of them in its own row.
-const NEIGHBOURS: usize = (2 * REACH_PX + 1) * (2 * REACH_PX + 1) - 1;
+pub const NEIGHBOURS: usize = (2 * REACH_PX + 1) * (2 * REACH_PX + 1) - 1;
 const ON_THE_LINE: f64 = (2 * REACH_PX) as f64 / NEIGHBOURS as f64;
 
 /// Side of the square window in which as many pixels make one as where neighbours are correlated by
@@ -170,11 +173,13 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::diagnose::noise::structure::Structure;
     use crate::rng::Seed;
     use crate::stats::noise_through_boxes;
 
     const WIDTH: usize = 120;
     const HEIGHT: usize = 90;
+    const BOX: usize = 5;
 
     /// Unit noise on a plane, with holes, plus `more` of (u, v); a hundred images' statistics.
     fn pairs(name: &str, rows: f64, more: impl Fn(usize, usize) -> f64) -> Vec<Pairs> {
@@ -212,21 +217,39 @@ mod tests {
         near(&all, |p| p.near, 0.0);
     }
 
-    /// Boxes of 5 px in a picture of three blocks of a line: pairs of its first and its last lie at opposite
+    /// So many images of noise through boxes of 5 px.
+    fn through_boxes(sides: [usize; 2], images: u64) -> Vec<Pairs> {
+        let one = |n: u64| {
+            let mut rng = Seed(n).stream("pairs/window");
+            let noise = noise_through_boxes(sides, BOX, &mut rng);
+            let image: Vec<f32> = noise.into_iter().map(|r| r as f32).collect();
+            Pairs::of(&image, sides[0]).unwrap()
+        };
+        (0..images).map(one).collect()
+    }
+
+    /// In a picture of three blocks of a line: pairs of its first and its last lie at opposite
     /// ends of the plane's slope.
     #[test]
     fn noise_through_a_window_shares_nothing_along_a_line() {
-        const BOX: usize = 5;
-        const SIDE: usize = 48;
-        let one = |n: u64| {
-            let mut rng = Seed(n).stream("pairs/window");
-            let noise = noise_through_boxes([SIDE, SIDE], BOX, &mut rng);
-            let image: Vec<f32> = noise.into_iter().map(|r| r as f32).collect();
-            Pairs::of(&image, SIDE).unwrap()
-        };
-        let all: Vec<Pairs> = (0..2000).map(one).collect();
+        let all = through_boxes([48, 48], 2000);
         near(&all, |p| p.row.unwrap(), 0.0);
         near(&all, |p| p.column.unwrap(), 0.0);
+    }
+
+    /// Eight hundred tell it to 2.5 %. The plane takes two of 47 rows that have nothing in common, and its slopes a little.
+    #[test]
+    fn what_lines_share_errs_as_is_said() {
+        let all = through_boxes([160, 160], 800);
+        let said = Structure {
+            variance_px2: all.iter().map(|p| p.power).sum::<f64>() / all.len() as f64,
+            window_px: Some(BOX as f64),
+            line_pairs: all[0].line_pairs,
+            ..Structure::default()
+        };
+        let square = all.iter().map(|p| p.row.unwrap().powi(2)).sum::<f64>() / all.len() as f64;
+        let ratio = square.sqrt() / said.line_error_px2(0);
+        assert!((0.88..1.05).contains(&ratio), "{ratio}");
     }
 
     #[test]

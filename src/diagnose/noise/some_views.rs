@@ -9,7 +9,8 @@ use crate::stats::{at_least, normal_beyond, student_upper};
 /// Fewer views than this, and than this share of all, are odd ones.
 const MIN_VIEWS: usize = 3;
 const MIN_SHARE: f64 = 0.2;
-/// Fewer views below what is expected do not tell how far views scatter: with two, half of it is chance.
+/// Fewer views below what is expected do not tell how far views scatter: with two, half of it is chance. Then the
+/// views' own error counts as much as so many.
 const MIN_BELOW: usize = 3;
 /// A view beyond the fewest is one of them where as far above is this improbable.
 const CLEAR: f64 = 0.01;
@@ -35,6 +36,16 @@ impl SomeViews {
         (n >= MIN_BELOW && scale > 0.0).then(|| SomeViews::beyond(off, scale, n))?
     }
 
+    /// Of what each view is off by in units of its own error, where too few lie below to tell how far views scatter:
+    /// where most of them have it.
+    pub fn above_error(off: &[f64]) -> Option<Self> {
+        let below = off.iter().filter(|t| **t < 0.0);
+        let (n, squares) = below.fold((0, 0.0), |(n, sum), t| (n + 1, sum + t * t));
+        let freedom = n + MIN_BELOW;
+        let scale = ((squares + MIN_BELOW as f64) / freedom as f64).sqrt();
+        (n < MIN_BELOW).then(|| SomeViews::beyond(off, scale, freedom))?
+    }
+
     /// Of what each view is off by, which is known to err by `scale`, as `freedom` values tell.
     pub fn beyond(off: &[f64], scale: f64, freedom: usize) -> Option<Self> {
         let above = |v: &usize| off[*v] > 0.0;
@@ -57,14 +68,24 @@ pub struct Above {
     pub p: f64,
 }
 
-/// Those of the views whose `value`, which is none on average where there is nothing, lies above the others'.
-pub fn some_views(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Above> {
+/// Those of the views whose `value`, which is none on average where there is nothing, lies above the others'; `error` is
+/// what pixels that have nothing in common make it err by, where that is known.
+pub fn some_views(
+    views: &[Structure],
+    value: impl Fn(&Structure) -> Option<f64>,
+    error: Option<fn(&Structure) -> f64>,
+) -> Option<Above> {
     let measured = |s: &Structure| Some((value(s).filter(|v| v.is_finite())?, s.pixels));
     let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
     let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
     let weight = Weight::of(&values);
-    let off = values.iter().map(|(x, size)| weight.at(*size).sqrt() * x);
-    let SomeViews { which: these, p } = SomeViews::above(&off.collect::<Vec<_>>())?;
+    let off: Vec<f64> = values.iter().map(|(x, size)| weight.at(*size).sqrt() * x).collect();
+    let by_error = |error: fn(&Structure) -> f64| {
+        let off: Vec<f64> = values.iter().zip(&which).map(|((x, _), s)| x / error(s)).collect();
+        SomeViews::above_error(&off)
+    };
+    let SomeViews { which: these, p } =
+        SomeViews::above(&off).or_else(|| error.and_then(by_error))?;
     let views = these.into_iter().map(|v| which[v].clone()).collect();
     Some(Above { views, of: which.len(), p })
 }
@@ -106,6 +127,23 @@ mod tests {
             // Binomial: 40, give or take 6.3; too few to one side make it fewer.
             assert!((8..60).contains(&seen), "{seen} of 4000 with {n}");
         }
+    }
+
+    /// By their own error, which is 1 here: of twelve views nine have it, and of the others fewer than three lie below
+    /// in half of the sessions. Views without anything are found no more often than the level says.
+    #[test]
+    fn most_of_the_views_are_told_by_their_own_error() {
+        let mut rng = Seed(5).stream("some-views/most");
+        let mut off = |tall| -> Vec<f64> {
+            views(12, tall, 15.0, &mut rng).into_iter().map(|x| 100.0 * x).collect()
+        };
+        let told = (0..200).filter_map(|_| SomeViews::above_error(&off(9)));
+        let told = told.filter(|s| s.p < 1e-4 && s.which.len() == 9).count();
+        // Of the three others none, one or two lie below in 7 of 8 sessions, and one in ten has a tenth view beyond one chance in a hundred or a wide scale.
+        assert!((120..=175).contains(&told), "{told} of 200");
+        let clean = |_| SomeViews::above_error(&off(0)).map_or(1.0, |s| s.p);
+        let seen = (0..20_000).map(clean).filter(|p| *p < 0.01).count();
+        assert!(seen < 60, "{seen} of 20000");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::frame_series::{Jitter, Squares};
 use super::moments::Moments;
-use super::pairs::{Pairs, REACH_PX};
+use super::pairs::{NEIGHBOURS, Pairs, REACH_PX};
 use super::still::{KeptPattern, beside_bias, still};
 use super::tail_counts::{MIN_READINGS, TailCounts};
 use super::texture::{
@@ -46,6 +46,8 @@ pub struct Structure {
     /// Variance that a row (a column) of one frame shares, px^2.
     pub row_px2: Option<f64>,
     pub column_px2: Option<f64>,
+    /// Pairs of pixels that tell it of rows, and of columns, each met twice.
+    pub line_pairs: [f64; 2],
     /// Of the frames' means about a line in time.
     pub jitter: Option<Jitter>,
     /// Of the frames' slopes over the picture.
@@ -84,6 +86,26 @@ impl Structure {
     pub fn skewness(&self) -> Option<[f64; 2]> {
         let disparity = self.moments.skewness()?;
         Some([disparity, disparity - 6.0 * self.relative_sigma])
+    }
+
+    /// What the variance that rows share (columns: 1) errs by where they share none, px^2: as the mean of so many
+    /// products of two pixels that lie apart. Through a window of the side W, products next to one another
+    /// along the line repeat as W times its pixels do, at both ends, and as their squares across it.
+    pub fn line_error_px2(&self, axis: usize) -> f64 {
+        let side = self.window_px.unwrap_or(1.0).max(1.0);
+        let alike = side * side * self.repeats().sqrt();
+        self.variance_px2 * (2.0 * alike / self.line_pairs[axis]).sqrt()
+    }
+
+    /// What the correlation of frames errs by where they have nothing in common.
+    pub fn lagged_error(&self) -> f64 {
+        let changes = self.lagged.iter().flatten().count() as f64;
+        (self.repeats() / (self.pixels * changes)).sqrt()
+    }
+
+    /// What the correlation of neighbours errs by at most where they have nothing in common: as from one change.
+    pub fn neighbour_error(&self) -> f64 {
+        (2.0 / (NEIGHBOURS as f64 * self.pixels)).sqrt()
     }
 
     /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang
@@ -143,6 +165,7 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
         let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
         (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
+        s.line_pairs = [0, 1].map(|k| pairs.iter().map(|p| p.line_pairs[k]).sum());
         s.neighbour_correlation = all(|p| Some(p.near / beside_lines(p.power, [p.row, p.column])));
         s.correlation_profile =
             correlation_profile(&changes(&frames), field.width, [s.row_px2, s.column_px2]);

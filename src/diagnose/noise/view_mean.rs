@@ -22,6 +22,15 @@ impl ViewMean {
         ViewMean::weighed(&values)
     }
 
+    /// Of the variance that rows share (columns: 1), px^2: a view counts by what it errs by, as the pairs in a line grow
+    /// with its length squared.
+    pub fn of_lines(views: &[Structure], axis: usize) -> Option<Self> {
+        let of = |s: &Structure| {
+            Some(([s.row_px2, s.column_px2][axis]?, s.line_error_px2(axis).powi(-2)))
+        };
+        ViewMean::weighed(&views.iter().filter_map(of).collect::<Vec<_>>())
+    }
+
     /// Of what each view shares with all the others: a pair of views counts in two of the values, so
     /// that these scatter less than their mean errs.
     pub fn of_pairs(
