@@ -232,6 +232,20 @@ fn a_shadow_of_some_views_is_told_with_how_many() {
     assert!(band(&shadows(|e| [0.0, lines(e)]), 1e-3).is_none(), "a line is what a border errs by");
 }
 
+/// Three views are enough for a shadow of several pixels, and not for what borders err by, nor for one object before
+/// the wall.
+#[test]
+fn a_shadow_of_three_views_is_seen() {
+    let of_three = |width: &dyn Fn(f64) -> f64| {
+        let views = shadows(|e| [width(e), 0.0]);
+        band(&views[..3], 1e-3)
+    };
+    let found = of_three(&|e| 0.7 * e).expect("6, 7 and 8 px");
+    assert!(found.lawful && found.of_some.is_none() && (found.share[0] - 0.7).abs() < 0.05);
+    assert!(of_three(&|_| 1.0).is_none(), "a pixel each");
+    assert!(of_three(&|e| if e > 11.0 { 30.0 } else { 0.0 }).is_none(), "in one view");
+}
+
 /// Four of fourteen views have footprints of 4 px to either side.
 #[test]
 fn mixing_of_some_views_is_told_with_how_many() {

@@ -9,6 +9,7 @@ use crate::diagnose::diagnosis::Curve;
 use crate::diagnose::noise::some_views::SomeViews;
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::null::student;
+use crate::stats::student_upper;
 
 /// Losses beside the target.
 #[derive(Debug, Clone)]
@@ -126,8 +127,8 @@ fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
     let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
-    // Two sides were looked at.
-    let p = (2.0 * lawful.p_above(0.0)).min(1.0);
+    // Two sides were looked at, and by the borders is the second test at this level.
+    let p = (2.0 * lawful.p_above(0.0).min(2.0 * beyond_borders(views))).min(1.0);
     let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
     let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
     Some(Band {
@@ -139,6 +140,20 @@ fn band_on(views: &[Sides], side: usize) -> Option<Band> {
         curve: curve(views, lawful.value),
         of_some: None,
     })
+}
+
+/// Chance of widths that go with the geometry's as these do. Of few views the scatter tells little: what a border errs
+/// by counts beside it, as much as the fewest views do.
+fn beyond_borders(views: &[EdgeLoss]) -> f64 {
+    let products = views.iter().map(|v| [v.lost, v.shaded].map(|px| px / v.rows));
+    let (own, cross, square) =
+        products.fold((0.0, 0.0, 0.0), |(own, cross, square), [lost, wide]| {
+            (own + lost * lost, cross + lost * wide, square + wide * wide)
+        });
+    let borders = MIN_VIEWS as f64;
+    let freedom = views.len() as f64 - 1.0 + borders;
+    let scatter = (own - cross * cross / square + borders * BORDER_PX.powi(2)) / freedom;
+    student_upper(cross / (square * scatter).sqrt(), freedom)
 }
 
 fn curve(views: &[EdgeLoss], share: f64) -> Curve {
