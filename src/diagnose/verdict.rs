@@ -7,6 +7,7 @@ use super::distance::reference::can_happen;
 use super::finding::naming::unname;
 use super::finding::other_findings::named;
 use super::search::outcome::Outcome;
+use super::views::field::Field;
 use super::views::tiles::SIDE;
 use crate::effects;
 use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
@@ -118,6 +119,22 @@ pub(super) fn untested([mean, variance]: [&Outcome; 2], block_tiles: usize) -> V
         format!("the size of the noise could not be tested: no target fills a patch of {side} x {side} px")
     });
     mean.into_iter().chain(variance).collect()
+}
+
+/// Of most views' number of frames: what so few cannot show, in words. A line in time takes two of them.
+pub(super) fn few_frames(fields: &[Field]) -> Option<String> {
+    let most = |n: usize| 2 * fields.iter().filter(|f| f.frames.len() <= n).count() > fields.len();
+    let (has, what) = if most(1) {
+        (
+            "one frame",
+            "noise that a view's frames or its rows have in common, frames that jitter and a target that moves",
+        )
+    } else {
+        ("two frames", "frames that jitter and a target that moves")
+    };
+    most(2).then(|| {
+        format!("a view has {has}: {what} were not looked for; record four or more frames a view")
+    })
 }
 
 /// The model with what was found.

@@ -10,7 +10,7 @@ use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
 use crate::diagnose::noise::texture_finding::TextureFinding;
-use crate::diagnose::noise::view_mean::ViewMean;
+use crate::diagnose::noise::view_mean::{ViewMean, variance_px2};
 use crate::diagnose::noise::{ROW_NOISE, expected_window};
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
@@ -30,12 +30,12 @@ pub fn replicated(
     if found.of_some.is_some() {
         return None;
     }
-    let beyond = beyond_known(found, known);
+    let (beyond, variance_px2) = (beyond_known(found, known), variance_px2(structure));
     let half = |which: bool| {
         let mine = second.iter().enumerate().filter(|(_, s)| **s == which).map(|(v, _)| v);
         match &beyond {
             Some(of) => {
-                let values = mine.filter_map(|v| sized(found, of, &structure[v]));
+                let values = mine.filter_map(|v| sized(found, of, &structure[v], variance_px2));
                 ViewMean::weighed(&values.collect::<Vec<_>>())
             }
             None if found.axis == Axis::EdgeDistance => {
@@ -55,11 +55,12 @@ pub fn gained(
     [rest, aside]: [&[usize]; 2],
 ) -> Vec<f64> {
     let mut gains = vec![0.0; aside.len()];
+    let variance_px2 = variance_px2(structure);
     // What has no name is in no model, and what some views have is no mean of all.
     let named = textures.iter().filter(|t| !t.families.is_empty());
     for texture in named.chain(tails).filter(|t| t.of_some.is_none()) {
         let Some(beyond) = beyond_known(texture, known) else { continue };
-        let of = |&v: &usize| sized(texture, &beyond, &structure[v]);
+        let of = |&v: &usize| sized(texture, &beyond, &structure[v], variance_px2);
         let learnt_on: Vec<(f64, f64)> = rest.iter().filter_map(of).collect();
         for (gain, view) in gains.iter_mut().zip(aside) {
             let nats = of(view).and_then(|own| ViewMean::predicts(&learnt_on, own));
@@ -70,10 +71,15 @@ pub fn gained(
 }
 
 /// A view's value with what it counts by, as for the finding.
-fn sized(found: &TextureFinding, beyond: &OfView, s: &Structure) -> Option<(f64, f64)> {
+fn sized(
+    found: &TextureFinding,
+    beyond: &OfView,
+    s: &Structure,
+    variance_px2: f64,
+) -> Option<(f64, f64)> {
     let size = match (found.families.first().copied(), found.axis, found.statistic) {
-        (Some(ROW_NOISE), ..) => s.line_error_px2(0).powi(-2),
-        (None, Axis::Column, Statistic::Correlation) => s.line_error_px2(1).powi(-2),
+        (Some(ROW_NOISE), ..) => s.line_size(0, variance_px2),
+        (None, Axis::Column, Statistic::Correlation) => s.line_size(1, variance_px2),
         _ => s.pixels,
     };
     Some((beyond(s).filter(|x| x.is_finite())?, size))

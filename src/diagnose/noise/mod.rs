@@ -98,12 +98,7 @@ fn textures_of_some(
     type OfAll = fn(&[Structure], &KnownTerms, f64) -> Vec<TextureFinding>;
     // Shares of a view's own variance, so that near and far views scatter alike.
     let all: [(&[&str], OfView, Error, OfAll); 3] = [
-        (
-            &[ROW_NOISE],
-            |s| Some(s.row_px2? / s.variance_px2),
-            |s| s.line_error_px2(0) / s.variance_px2,
-            lines,
-        ),
+        (&[ROW_NOISE], |s| Some(s.row_px2? / s.variance_px2), |s| s.line_error(0), lines),
         // Rounding stands still: where it hides what neighbours share, frames are alike too.
         (
             &["frozen-noise", "temporal-correlation"],

@@ -248,7 +248,7 @@ mod tests {
             ..Structure::default()
         };
         let square = all.iter().map(|p| p.row.unwrap().powi(2)).sum::<f64>() / all.len() as f64;
-        let ratio = square.sqrt() / said.line_error_px2(0);
+        let ratio = square.sqrt() / (said.variance_px2 * said.line_error(0));
         assert!((0.88..1.05).contains(&ratio), "{ratio}");
     }
 

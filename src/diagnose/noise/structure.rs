@@ -88,13 +88,19 @@ impl Structure {
         Some([disparity, disparity - 6.0 * self.relative_sigma])
     }
 
-    /// What the variance that rows share (columns: 1) errs by where they share none, px^2: as the mean of so many
-    /// products of two pixels that lie apart. Through a window of the side W, products next to one another
-    /// along the line repeat as W times its pixels do, at both ends, and as their squares across it.
-    pub fn line_error_px2(&self, axis: usize) -> f64 {
+    /// What the share of the variance that rows have in common (columns: 1) errs by where they have none: as the mean of
+    /// so many products of two pixels that lie apart. Through a window of the side W, products next to one
+    /// another along the line repeat as W times its pixels do, at both ends, and as their squares across it.
+    pub fn line_error(&self, axis: usize) -> f64 {
         let side = self.window_px.unwrap_or(1.0).max(1.0);
         let alike = side * side * self.repeats().sqrt();
-        self.variance_px2 * (2.0 * alike / self.line_pairs[axis]).sqrt()
+        (2.0 * alike / self.line_pairs[axis]).sqrt()
+    }
+
+    /// What a view counts by for that variance, in px^2, where all err by `variance_px2` a pixel: no view tells more
+    /// for its readings' being all one word.
+    pub fn line_size(&self, axis: usize, variance_px2: f64) -> f64 {
+        (self.line_error(axis) * self.variance_px2.max(variance_px2).max(1e-12)).powi(-2)
     }
 
     /// What the correlation of frames errs by where they have nothing in common.

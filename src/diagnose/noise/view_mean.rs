@@ -25,9 +25,9 @@ impl ViewMean {
     /// Of the variance that rows share (columns: 1), px^2: a view counts by what it errs by, as the pairs in a line grow
     /// with its length squared.
     pub fn of_lines(views: &[Structure], axis: usize) -> Option<Self> {
-        let of = |s: &Structure| {
-            Some(([s.row_px2, s.column_px2][axis]?, s.line_error_px2(axis).powi(-2)))
-        };
+        let variance = variance_px2(views);
+        let of =
+            |s: &Structure| Some(([s.row_px2, s.column_px2][axis]?, s.line_size(axis, variance)));
         ViewMean::weighed(&views.iter().filter_map(of).collect::<Vec<_>>())
     }
 
