@@ -27,7 +27,6 @@ use super::search::variance;
 use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
 use super::verdict::{forget_impossible, merge, symptoms};
 use super::views::field::Field;
-use crate::stats::mean;
 use crate::terms::{Axis, Statistic, corner_radius};
 
 /// How noise hangs together changes what a few frames show of its size by so much.
@@ -99,7 +98,7 @@ impl Case<'_> {
         let ranges = self.ranges.clone().map(|f| findings::placed(f, &scenes[0]));
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
-        curves.retain(|f| self.is_news(f, &mean, &scatter));
+        curves.retain(|f| self.is_news(f, &scatter));
         // Laws are fitted beside what is told.
         let mut bias = mean.terms.clone();
         curves.retain(|f| {
@@ -147,9 +146,8 @@ impl Case<'_> {
         self.baseline.as_ref().map(|b| &b.fields[..])
     }
 
-    /// Steps shift the mean within a step, rows that err as one shift theirs, and gross errors add to the variance:
-    /// none of it is news.
-    fn is_news(&self, f: &Finding, bias: &MeanResult, scatter: &ScatterResult) -> bool {
+    /// Steps shift the mean within a step, and gross errors add to the variance: none of it is news.
+    fn is_news(&self, f: &Finding, scatter: &ScatterResult) -> bool {
         let coarsest = self.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
         let sigma_px = typical_sigma_px(&self.fields);
         // A fine step errs as noise does, and shifts the mean by less than a four hundredth.
@@ -162,21 +160,13 @@ impl Case<'_> {
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && own_step(&self.lattice, self.recording, self.fields[0].scale_px_m).is_none()
             && f.size.sigma * sigma_px < 0.3 * coarsest;
-        // Where rows err as one, so does their mean in every view: for no curve over the rows.
-        let over_rows = f.statistic == Statistic::Bias && f.axis == Axis::Row && f.effect.is_none();
-        let of_rows = over_rows && {
-            let excess = self.excess_of_rows(&scatter.structure, &scatter.textures);
-            let excess = mean(excess.iter().map(|[of_mean, _]| *of_mean)).unwrap_or(1.0);
-            excess > 1.0
-                && f.share / excess < bias.outcome.noise.threshold(self.level(Self::MEAN_LEVEL))
-        };
         let of_all =
             |t: &TextureFinding| t.of_some.is_none() && t.statistic != Statistic::Distribution;
         let textures = scatter.textures.iter().any(of_all) || scatter.tails.is_some();
         let textured = scatter.tails.as_ref().is_some_and(TextureFinding::are_far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;
-        !stepped && !tailed && !of_rows
+        !stepped && !tailed
     }
 
     /// Is what was measured clearly more than twice of what the model has?
@@ -237,7 +227,7 @@ impl Case<'_> {
         let bias = || {
             let candidates = bias::candidates(&bounds);
             let rules = survey.bias_rules(camera, level);
-            let excess = self.excess_of_mean(measured);
+            let excess = self.excess_of_pattern(&measured.structure);
             few_views(mean, &survey.mean_data(), &candidates, outcomes[0], &rules, &excess, seed)
         };
         let variance = || {

@@ -42,10 +42,7 @@ impl Case<'_> {
         let each = self.level(Self::EACH_LEVEL);
         let mut textures = self.textures(&mut structure, each);
         self.learn_lines(mean, &textures);
-        let excess = self.excess_of_rows(&structure, &textures);
-        for (view, [_, of_log_variance]) in self.survey.views.iter_mut().zip(excess) {
-            view.log_variance_inflation *= of_log_variance;
-        }
+        self.weigh_rows(mean, &structure, &textures);
         self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
         let compared =
             self.baseline.as_mut().is_some_and(|baseline| baseline.variances(&mut self.survey));
@@ -110,6 +107,30 @@ impl Case<'_> {
         }
     }
 
+    /// Where rows have an error of their own, as was found or is known, they tell less of the mean and of the noise's
+    /// size than their pixels do.
+    fn weigh_rows(
+        &mut self,
+        mean: &mut MeanResult,
+        structure: &[Structure],
+        textures: &[TextureFinding],
+    ) {
+        let found = textures.iter().any(|t| t.families.contains(&ROW_NOISE));
+        if !(found || self.known.has(ROW_NOISE)) {
+            return;
+        }
+        for (s, view) in structure.iter().zip(&mut self.survey.views) {
+            let [of_mean, of_log_variance] = s.excess_of_rows(&view.correlation);
+            view.row_inflation = of_mean;
+            view.log_variance_inflation *= of_log_variance;
+        }
+        let lines: Vec<Axis> = mean.lines.iter().map(|l| l.axis).collect();
+        *mean = self.mean();
+        if !lines.is_empty() {
+            self.take_out_lines(mean, &lines);
+        }
+    }
+
     fn take_out_lines(&self, mean: &mut MeanResult, axes: &[Axis]) {
         let views = beside_bias(&self.fields, &mean.px);
         mean.lines = axes.iter().filter_map(|axis| LearntLines::of(&views, *axis)).collect();
@@ -152,29 +173,11 @@ impl Case<'_> {
         textures
     }
 
-    /// [`Structure::excess_of_rows`] of the views where rows have an error of their own, as was found or is
-    /// known; one where they have none.
-    pub fn excess_of_rows(
-        &self,
-        structure: &[Structure],
-        textures: &[TextureFinding],
-    ) -> Vec<[f64; 2]> {
-        let found = textures.iter().any(|t| t.families.contains(&ROW_NOISE));
-        let alike = found || self.known.has(ROW_NOISE);
+    /// How many times less sure the mean of each view is than its samples say, with a pattern that all views show.
+    pub fn excess_of_pattern(&self, structure: &[Structure]) -> Vec<f64> {
+        let (px2, n) = (fixed_px2(structure), structure.len() as f64);
         let views = structure.iter().zip(&self.survey.views);
-        views
-            .map(|(s, v)| if alike { s.excess_of_rows(&v.correlation) } else { [1.0; 2] })
-            .collect()
-    }
-
-    /// How many times less sure the mean of each view is than its samples say: of rows that err as one, and of
-    /// a pattern that all views show.
-    pub fn excess_of_mean(&self, measured: &ScatterResult) -> Vec<f64> {
-        let of_rows = self.excess_of_rows(&measured.structure, &measured.textures).into_iter();
-        let (px2, n) = (fixed_px2(&measured.structure), measured.structure.len() as f64);
-        let views = measured.structure.iter().zip(&self.survey.views);
-        let of_pattern = views.map(|(s, v)| s.excess_of_pattern(px2, v.frames, n, &v.correlation));
-        of_rows.zip(of_pattern).map(|([of_rows, _], of_pattern)| of_rows * of_pattern).collect()
+        views.map(|(s, v)| s.excess_of_pattern(px2, v.frames, n, &v.correlation)).collect()
     }
 
     /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or

@@ -94,6 +94,7 @@ impl Survey {
                     correlation,
                     frames: independent_frames(f),
                     log_variance_inflation: 1.0,
+                    row_inflation: 1.0,
                     between_frame_factor: None,
                     in_second_half,
                 }

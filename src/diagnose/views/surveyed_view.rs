@@ -25,6 +25,8 @@ pub struct SurveyedView {
     pub frames: f64,
     /// How many times more uncertain the logarithm of its variance is than by that.
     pub log_variance_inflation: f64,
+    /// By how much more the mean's variance exceeds that, as whole rows err as one.
+    pub row_inflation: f64,
     /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
     /// with a single frame.
     pub between_frame_factor: Option<f64>,
@@ -97,7 +99,7 @@ pub fn mean_data(view: &SurveyedView) -> ViewData {
 impl SurveyedView {
     /// Inverse variance of a tile's mean, 1/px^2.
     pub fn weight(&self, tile: &Tile) -> f64 {
-        finite(tile.pixels / tile.variance / self.inflation)
+        finite(tile.pixels / tile.variance / self.inflation / self.row_inflation)
     }
 
     /// Of all tiles together.
@@ -153,6 +155,7 @@ impl SurveyedView {
             correlation: Correlation::white(),
             frames,
             log_variance_inflation: 1.0,
+            row_inflation: 1.0,
             between_frame_factor: Some(1.0),
             in_second_half: false,
         }
