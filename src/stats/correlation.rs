@@ -23,7 +23,7 @@ pub struct Correlation {
 }
 
 /// Longest lag looked at, px: four times a Kinect's matching window.
-const LONGEST_LAG: usize = 40;
+pub const LONGEST_LAG: usize = 40;
 /// Correlations below this count as dead.
 const DEAD: f64 = 0.05;
 /// The squares' correlation is told from rho^2 from so many times two standard errors on, .1 for [`PAIRS`]: copied

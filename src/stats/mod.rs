@@ -11,7 +11,7 @@ pub use budget::{
 };
 #[cfg(test)]
 pub use correlation::noise_through_boxes;
-pub use correlation::{Correlation, measure_correlation};
+pub use correlation::{Correlation, LONGEST_LAG, measure_correlation};
 pub use paule_mandel::{between, paule_mandel};
 pub use random_effects::{RandomEffects, common_value};
 pub use summed_area::SummedArea;

@@ -122,6 +122,7 @@ impl Case<'_> {
         for (s, view) in structure.iter().zip(&mut self.survey.views) {
             let [of_mean, of_log_variance] = s.excess_of_rows(&view.correlation);
             view.row_inflation = of_mean;
+            view.row_correlation = s.row_correlation();
             view.log_variance_inflation *= of_log_variance;
         }
         let lines: Vec<Axis> = mean.lines.iter().map(|l| l.axis).collect();

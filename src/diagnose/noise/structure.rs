@@ -15,7 +15,7 @@ use super::texture::{
 };
 use crate::diagnose::options::FRAMES_KEPT;
 use crate::diagnose::views::field::Field;
-use crate::stats::{Correlation, mean};
+use crate::stats::{Correlation, LONGEST_LAG, mean};
 
 /// What one view tells; `None` where it cannot.
 #[derive(Debug, Clone, Default)]
@@ -118,12 +118,21 @@ impl Structure {
     /// together so say, for a shape that the row decides where rows have an error of their own: along one
     /// all pixels share it, on a target about as wide as it is high.
     pub fn excess_of_rows(&self, correlation: &Correlation) -> [f64; 2] {
-        let shared = self.row_px2.unwrap_or(0.0).max(0.0) / self.variance_px2.max(1e-12);
+        let shared = self.row_share();
         let along = self.pixels.sqrt();
         [
             1.0 + along * shared / correlation.sum.max(1.0),
             1.0 + along * shared * shared / correlation.sum_of_squares.max(1.0),
         ]
+    }
+
+    /// What rows that err as one make of a correlation's sum, as far as it reaches.
+    pub fn row_correlation(&self) -> f64 {
+        1.0 + 2.0 * LONGEST_LAG as f64 * self.row_share()
+    }
+
+    fn row_share(&self) -> f64 {
+        self.row_px2.unwrap_or(0.0).max(0.0) / self.variance_px2.max(1e-12)
     }
 
     /// How many times the variance of a mean of this and other `views` exceeds what each alone says, where their

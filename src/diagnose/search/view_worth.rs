@@ -27,10 +27,13 @@ const SLIGHT: f64 = 1e-6;
 
 /// How many times surer each view's mean is if its noise is as it usually is than by its own measure,
 /// which takes a cause that the others do not have for noise; 1 where they agree. Noise that the view's
-/// frames show is no such cause.
+/// frames show is no such cause, nor are rows that err as one in each of them.
 pub fn doubted(survey: &Survey) -> Vec<f64> {
-    let beside_noise =
-        |v: &SurveyedView| v.inflation / v.noise_by_frames().map_or(1.0, |r| r.max(1.0));
+    let of_noise = |v: &SurveyedView| {
+        let of_rows = v.row_correlation.min(v.correlation.sum);
+        of_rows * v.noise_by_frames().map_or(1.0, |r| r.max(1.0))
+    };
+    let beside_noise = |v: &SurveyedView| v.inflation / of_noise(v);
     doubts(&survey.views.iter().map(beside_noise).collect::<Vec<f64>>())
 }
 

@@ -95,6 +95,7 @@ impl Survey {
                     frames: independent_frames(f),
                     log_variance_inflation: 1.0,
                     row_inflation: 1.0,
+                    row_correlation: 1.0,
                     between_frame_factor: None,
                     in_second_half,
                 }

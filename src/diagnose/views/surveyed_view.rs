@@ -27,6 +27,8 @@ pub struct SurveyedView {
     pub log_variance_inflation: f64,
     /// By how much more the mean's variance exceeds that, as whole rows err as one.
     pub row_inflation: f64,
+    /// What these rows alone make of the correlation's sum.
+    pub row_correlation: f64,
     /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
     /// with a single frame.
     pub between_frame_factor: Option<f64>,
@@ -156,6 +158,7 @@ impl SurveyedView {
             frames,
             log_variance_inflation: 1.0,
             row_inflation: 1.0,
+            row_correlation: 1.0,
             between_frame_factor: Some(1.0),
             in_second_half: false,
         }
