@@ -9,6 +9,7 @@ mod column_steps;
 mod doubtful;
 mod finish;
 mod grouping;
+mod mean;
 mod scan;
 mod table;
 mod view;

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::budget::distance_budget;
 use super::grouping::words_a_step;
+use super::mean::mean_inverse_depth;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
 use crate::error::{Error, Result};
@@ -147,7 +148,9 @@ impl Iterator for FrameReader<'_> {
 }
 
 fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
-    let mut w = mean_inverse_depth(held, &bench.table);
+    let words = held.iter().flat_map(|frame| frame.raw.iter().copied());
+    let words_a_step = words_a_step(words, &bench.table);
+    let mut w = mean_inverse_depth(held, bench, words_a_step);
     if bench.ray_share != 0.0 {
         for (i, w) in w.iter_mut().enumerate() {
             let (x, y) = bench.rays.at(i);
@@ -155,8 +158,6 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
             *w /= (1.0 - bench.ray_share * (1.0 - foreshortening)) as f32;
         }
     }
-    let words = held.iter().flat_map(|frame| frame.raw.iter().copied());
-    let words_a_step = words_a_step(words, &bench.table);
     let image = InverseDepthImage {
         w: &w,
         rays: &bench.rays,
@@ -167,27 +168,6 @@ fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Targe
     let remedy = "give the target's region in view.json (roi or polygon), or record the view again";
     find_target(&image, view.notes.region.as_ref(), &mut rng)
         .map_err(|what| failed(view, what, remedy))
-}
-
-/// Mean over the frames, where at least half of them measured; 1/m, NaN elsewhere.
-fn mean_inverse_depth(frames: &[Frame], table: &DepthTable) -> Vec<f32> {
-    let n = frames[0].raw.len();
-    let mut sum = vec![0f32; n];
-    let mut count = vec![0u8; n];
-    for frame in frames {
-        for ((s, c), &raw) in sum.iter_mut().zip(&mut count).zip(&frame.raw) {
-            let z = table.metres(raw);
-            if z.is_finite() {
-                *s += 1.0 / z;
-                *c += 1;
-            }
-        }
-    }
-    let mean = |(s, &c): (f32, &u8)| {
-        let enough = 2 * usize::from(c) >= frames.len() && c > 0;
-        if enough { s / f32::from(c) } else { f32::NAN }
-    };
-    sum.into_iter().zip(&count).map(mean).collect()
 }
 
 /// Mean amplitude over the target in the view's first readable infrared image.
