@@ -27,7 +27,13 @@ impl Scan<'_> {
         let correlation = self.correlation(first, &plane, &sums);
         let temporal_correlation = self.lagged.correlation();
         let context = self.context(&correlation, temporal_correlation);
-        let (cells, trusted, notes) = trusted_cells(&sums, &context);
+        let (cells, trusted, mut notes) = trusted_cells(&sums, &context);
+        notes.extend(self.follow.drift_sigmas().map(|sigmas| {
+            format!(
+                "the target moves away by {sigmas:+.1} of its sigmas from its first frames to its last: it, the \
+                 sensor or its temperature drifts, which temporal sigma holds and spatial sigma does not"
+            )
+        }));
         let whole = context.cell(&trusted)?;
         let axis_distance_m = plane.depth(0.0, 0.0);
         // The same error of the inverse depth, at another depth.

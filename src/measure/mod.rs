@@ -8,6 +8,7 @@ mod cells;
 mod column_steps;
 mod doubtful;
 mod finish;
+mod follow;
 mod grouping;
 mod mean;
 mod scan;

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::follow::{Follow, MAJORITY, NO_SHIFT, centre};
 use super::grouping::{CUT_SIGMAS, by_cell, settled_scale, words_a_step};
 use super::{Planes, Workbench};
 use crate::frame::Frame;
@@ -22,8 +23,9 @@ pub(super) struct Scan<'a> {
     pub(super) words_a_step: f64,
     /// Expected depth, m, pixel by pixel of `pixels`.
     pub(super) expected: Vec<f32>,
-    /// Greatest residual kept in each cell, m.
+    /// Greatest residual kept in each cell, m, from where the cell lies in the frame.
     pub(super) cut: Vec<f32>,
+    pub(super) follow: Follow,
     pub(super) count: Vec<u32>,
     pub(super) sum: Vec<f64>,
     pub(super) square: Vec<f64>,
@@ -61,6 +63,7 @@ impl<'a> Scan<'a> {
             plane,
             words_a_step,
             cut: vec![0.0; cells],
+            follow: Follow::over(cells, held.len()),
             count: vec![0; n],
             sum: vec![0.0; n],
             square: vec![0.0; n],
@@ -80,19 +83,54 @@ impl<'a> Scan<'a> {
 
     /// Robust scale of each cell: median absolute deviation, then cut and corrected to its end.
     fn find_cuts(&mut self, held: &[Frame]) {
-        const ENOUGH: usize = 20_000;
         for cell in 0..self.cut.len() {
-            let range = self.cell_range(cell);
-            let stride = (range.len() * held.len() / ENOUGH).max(1);
-            let residuals: Vec<f32> = held
+            let (range, stride) = (self.cell_range(cell), self.stride(cell));
+            let mut residuals: Vec<f32> = held
                 .iter()
                 .flat_map(|frame| range.clone().map(move |k| (frame, k)))
                 .step_by(stride)
                 .map(|(frame, k)| self.residual(frame, k))
                 .filter(|e| e.is_finite())
                 .collect();
-            self.cut[cell] = (CUT_SIGMAS * settled_scale(residuals, self.min_scale(cell))) as f32;
+            let scale = settled_scale(residuals.clone(), self.min_scale(cell));
+            self.cut[cell] = (CUT_SIGMAS * scale) as f32;
+            self.follow.usual[cell] = centre(&mut residuals, self.cut[cell]);
         }
+    }
+
+    /// Every how many pixels of a cell are enough for its cut.
+    fn stride(&self, cell: usize) -> usize {
+        const ENOUGH: usize = 20_000;
+        (self.cell_range(cell).len() * self.follow.held / ENOUGH).max(1)
+    }
+
+    /// By how much each cell's residuals lie off, as a whole, in this frame; `None` where more than half of what
+    /// it measured is too far off.
+    fn shifts(&mut self, frame: &Frame) -> Option<Vec<f32>> {
+        let (mut kept, mut measured) = (0, 0);
+        let mut offsets = Vec::with_capacity(self.cut.len());
+        for (cell, &cut) in self.cut.iter().enumerate() {
+            let stride = self.stride(cell);
+            let pixels = self.cell_range(cell).step_by(stride);
+            let mut residuals: Vec<f32> =
+                pixels.map(|k| self.residual(frame, k)).filter(|e| e.is_finite()).collect();
+            let offset = self.follow.offset(cell, centre(&mut residuals, cut), cut);
+            kept += stride * residuals.iter().filter(|e| (*e - offset).abs() < cut).count();
+            measured += stride * residuals.len();
+            offsets.push(offset);
+        }
+        if self.follow.held >= MAJORITY && 2 * kept < measured {
+            return None;
+        }
+        self.follow.last.clone_from(&offsets);
+        let largest = (0..self.cut.len()).max_by_key(|&cell| self.cell_range(cell).len())?;
+        self.follow.path.push(offsets[largest] / self.cut[largest]);
+        for (offset, cut) in offsets.iter_mut().zip(&self.cut) {
+            if offset.abs() < NO_SHIFT * cut {
+                *offset = 0.0;
+            }
+        }
+        Some(offsets)
     }
 
     /// Step of the sensor at inverse depth `w`, 1/m.
@@ -124,26 +162,29 @@ impl<'a> Scan<'a> {
         (sum / n).sqrt()
     }
 
-    pub fn add(&mut self, frame: &Frame) {
+    /// Whether it was taken: not where most of the target is off what the first frames show.
+    pub fn add(&mut self, frame: &Frame) -> bool {
+        let Some(shifts) = self.shifts(frame) else { return false };
         match self.bench.options.planes {
             Planes::PerView => {
                 self.own_planes += self.plane.q;
-                self.accumulate(frame, None);
+                self.accumulate(frame, None, &shifts);
             }
             Planes::PerFrame => {
-                let own = self.own_plane(frame).unwrap_or(self.plane);
+                let own = self.own_plane(frame, &shifts).unwrap_or(self.plane);
                 self.own_planes += own.q;
-                self.accumulate(frame, Some(own));
+                self.accumulate(frame, Some(own), &vec![0.0; shifts.len()]);
             }
         }
         self.lagged.frames += 1;
+        true
     }
 
-    fn accumulate(&mut self, frame: &Frame, own: Option<Plane>) {
+    fn accumulate(&mut self, frame: &Frame, own: Option<Plane>, shifts: &[f32]) {
         let follow = self.lagged.frames < HELD_FRAMES;
         let mut residuals = if follow { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
         for cell in 0..self.cut.len() {
-            let cut = self.cut[cell];
+            let (cut, shift) = (self.cut[cell], shifts[cell]);
             let (mut n, mut total) = (0u32, 0f64);
             for k in self.cell_range(cell) {
                 let i = self.pixels[k] as usize;
@@ -153,7 +194,7 @@ impl<'a> Scan<'a> {
                     Some(plane) => plane.depth_at(&self.bench.rays, i) as f32,
                 };
                 let e = z - expected;
-                if e.abs() < cut {
+                if (e - shift).abs() < cut {
                     self.count[k] += 1;
                     let e64 = f64::from(e);
                     self.sum[k] += e64;
@@ -182,13 +223,13 @@ impl<'a> Scan<'a> {
     }
 
     /// Least squares of this frame alone, on the residuals inside the cut, in inverse depth.
-    fn own_plane(&self, frame: &Frame) -> Option<Plane> {
+    fn own_plane(&self, frame: &Frame, shifts: &[f32]) -> Option<Plane> {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
         for cell in 0..self.cut.len() {
             for k in self.cell_range(cell) {
                 let e = self.residual(frame, k);
-                if e.abs() < self.cut[cell] {
+                if (e - shifts[cell]).abs() < self.cut[cell] {
                     let (x, y) = self.bench.rays.at(self.pixels[k] as usize);
                     let ray = Vector3::new(x, y, 1.0);
                     let z = f64::from(self.expected[k]);

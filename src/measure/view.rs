@@ -20,19 +20,34 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
     let mut reader = FrameReader::of(view, &mut source, &bench.table);
-    let held: Vec<Frame> = reader.hold(view)?.into_iter().map(|(_, frame)| frame).collect();
+    let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
     let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
-    held.iter().for_each(|frame| scan.add(frame));
-    reader.by_ref().for_each(|(_, frame)| scan.add(&frame));
+    let mut strays: Vec<usize> = Vec::new();
+    let mut add = |number: usize, frame: &Frame| {
+        let taken = scan.add(frame);
+        strays.extend((!taken).then_some(number));
+        taken
+    };
+    let mut first = None;
+    for (&number, frame) in numbers.iter().zip(&held) {
+        let taken = add(number, frame);
+        first = first.or(taken.then_some(frame));
+    }
+    for (number, frame) in reader.by_ref() {
+        add(number, &frame);
+    }
     let mut notes = reader.notes;
-    let paper = by_the_paper(view, bench, &target, &held[0], scan.sigma_perpendicular());
-    let infrared = infrared_of(view, &target, bench, &mut notes);
-    notes.extend(target.notes.iter().cloned());
-    let measured = scan.finish(&target, &held[0]).ok_or_else(|| {
+    notes.extend(stray_note(view, &strays));
+    let nothing = || {
         let what = "the residuals of its plane cannot be measured".into();
         failed(view, what, "record the view again")
-    })?;
+    };
+    let first = first.ok_or_else(nothing)?;
+    let paper = by_the_paper(view, bench, &target, first, scan.sigma_perpendicular());
+    let infrared = infrared_of(view, &target, bench, &mut notes);
+    notes.extend(target.notes.iter().cloned());
+    let measured = scan.finish(&target, first).ok_or_else(nothing)?;
     notes.extend(measured.notes);
     let mut measured = ViewMeasurement {
         name: view.name.clone(),
@@ -47,6 +62,16 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     };
     measured.distance_budget = distance_budget(&measured, &view.notes, bench.sensor);
     Ok(measured)
+}
+
+fn stray_note(view: &View, strays: &[usize]) -> Option<String> {
+    let first = view.depth[*strays.first()?].place();
+    Some(format!(
+        "{} of {} frames left out, the first is {first}: most of the target is not where the other frames show it; \
+         such a frame is stale or damaged, or something was moved",
+        strays.len(),
+        view.depth.len()
+    ))
 }
 
 /// The target of one view, from its first frames; and these, by their numbers in the view.
