@@ -133,7 +133,7 @@ fn grown(
         for ((open, known), barred) in open.iter_mut().zip(&known).zip(barred) {
             *open &= *known && !barred;
         }
-        let next = lattice.reached(&open, seeds);
+        let next = lattice.reached_across_bands(&open, seeds);
         if next == mask {
             break;
         }

@@ -105,6 +105,10 @@ impl Lattice {
         self.sample.iter().zip(mask).filter(|(_, m)| **m).filter_map(|(s, _)| *s).collect()
     }
 
+    pub fn is_measured(&self, node: usize) -> bool {
+        self.sample[node].is_some()
+    }
+
     pub fn measured(&self) -> impl Iterator<Item = bool> + '_ {
         self.sample.iter().map(Option::is_some)
     }

@@ -5,6 +5,8 @@ use crate::stats::SummedArea;
 
 /// Gaps up to this many nodes are crossed: speckle holes, not the gap between two objects.
 const BRIDGE: usize = 2;
+/// Bands without any measurement are crossed up to this many nodes: 18 px on a 640 px image.
+const BAND: usize = 6;
 
 impl Lattice {
     /// Nodes reached from `seeds` over `open` nodes.
@@ -26,6 +28,38 @@ impl Lattice {
             }
         }
         mask
+    }
+
+    /// The same, and over bands without a measurement.
+    pub fn reached_across_bands(&self, open: &[bool], seeds: &[usize]) -> Vec<bool> {
+        let mut from = seeds.to_vec();
+        loop {
+            let mask = self.reached(open, &from);
+            let beyond = self.across_bands(&mask, open);
+            if beyond.is_empty() {
+                return mask;
+            }
+            from.extend(beyond);
+        }
+    }
+
+    /// Open nodes that face the set ones over a band without a measurement: rows or columns that the sensor lost.
+    fn across_bands(&self, mask: &[bool], open: &[bool]) -> Vec<usize> {
+        let inside = |c: isize, r: isize| {
+            let node = r * self.columns as isize + c;
+            let inside =
+                (0..self.columns as isize).contains(&c) && (0..self.rows as isize).contains(&r);
+            inside.then_some(node as usize)
+        };
+        let far_side = |node: usize, [dc, dr]: [isize; 2]| {
+            let (c, r) = ((node % self.columns) as isize, (node / self.columns) as isize);
+            let line = (1..=BAND as isize + 1).map_while(|k| inside(c + k * dc, r + k * dr));
+            line.into_iter().find(|&n| self.is_measured(n)).filter(|&n| open[n] && !mask[n])
+        };
+        let sides = [[1, 0], [-1, 0], [0, 1], [0, -1]];
+        let set = (0..mask.len()).filter(|&node| mask[node]);
+        set.flat_map(|node| sides.into_iter().filter_map(move |side| far_side(node, side)))
+            .collect()
     }
 
     pub(super) fn around(&self, node: usize, radius: usize) -> impl Iterator<Item = usize> + '_ {

@@ -293,6 +293,23 @@ fn a_wall_that_fills_the_picture_is_the_target() {
     expect_first("wall", &[Thing::wall(2.0)], 0.0);
 }
 
+/// Ten rows and eight columns of no reading cut the picture in four.
+#[test]
+fn bands_without_depth_do_not_cut_the_target() {
+    for (seed, [z, theta]) in [[1.0, 0.0], [2.0, 0.6], [3.0, 0.2]].into_iter().enumerate() {
+        let mut scene = draw(&[Thing::board(z, theta, [9.0, 9.0])], seed as u64);
+        let width = scene.camera.width;
+        for (i, w) in scene.w.iter_mut().enumerate() {
+            if (300..310).contains(&(i / width)) || (200..208).contains(&(i % width)) {
+                *w = f32::NAN;
+            }
+        }
+        let target = find(&scene).expect("a wall");
+        let share = target.pixels.len() as f64 / scene.w.len() as f64;
+        assert!(share > 0.9 && target.notes.is_empty(), "{z} m: {share:.2}, {:?}", target.notes);
+    }
+}
+
 /// A driver that stores the range for the depth bends a wall into a bowl. The whole picture is the
 /// target, so that a diagnosis can say what bends it; a room's corner stays none.
 #[test]
