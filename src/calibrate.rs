@@ -250,7 +250,7 @@ fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFi
     let smooth = measurements.views.iter().filter(|v| v.correlation.persists).count();
     if smooth > 0 {
         warnings.push(format!(
-            "in {smooth} of {total} views the residual is smooth over more than 40 px: sigma there holds a \
+            "in {smooth} of {total} views the residual hangs together over more than 40 px: sigma there holds a \
              systematic error (lens, bands; see the pictures), and frames do not average it out"
         ));
     }

@@ -9,6 +9,7 @@ use super::Plane;
 use super::affine::{AffineFit, Effort, MAD_TO_SIGMA, fit_affine_robust};
 use super::image::{Exclusions, InverseDepthImage, MIN_PIXELS, Target};
 use crate::stats::{TUKEY, median_in_place};
+use crate::units::{shortest, to_digits};
 
 /// Terms of a polynomial of the fourth degree in (x, y): of 1/cos, which the range over a wall
 /// follows, it leaves 0.1 % at 40 degrees off the axis.
@@ -68,9 +69,9 @@ fn target(
         ..Exclusions::default()
     };
     let note = format!(
-        "the surface is smooth but bent, by up to {:.1} % of its distance: taken for a plane that the \
+        "the surface is smooth but bent, by up to {} % of its distance: taken for a plane that the \
          sensor bends; if it is itself curved, use a flat one",
-        100.0 * bend
+        shortest(to_digits(100.0 * bend, 2))
     );
     let on_plane = |&i: &u32| fit.plane.inverse_depth_at(image.rays, i as usize);
     // Holes farther than all that is measured are out of the sensor's range, and no losses.
