@@ -3,6 +3,7 @@
 use super::wanted::Pose;
 use crate::camera::{Camera, Rays};
 use crate::frame::{DepthCode, DepthTable, Frame};
+use crate::measure::{sensor_step, words_a_step};
 use crate::plane::{Effort, InverseDepthImage, Plane, find_target, fit_affine_robust};
 use crate::rng::Seed;
 use crate::stats::range;
@@ -46,6 +47,8 @@ pub struct Watcher {
     rays: Rays,
     table: DepthTable,
     code: DepthCode,
+    /// From one step of the sensor to the next; see [`words_a_step`].
+    words_a_step: f64,
     /// Every how many pixels is looked at, along rows and columns.
     every: usize,
     columns: usize,
@@ -82,6 +85,7 @@ impl Watcher {
             camera,
             table: sensor.code.table(),
             code: sensor.code,
+            words_a_step: 1.0,
             every,
             columns: full.width,
             followed: None,
@@ -95,7 +99,7 @@ impl Watcher {
         self.take_in(frame);
         let followed = match self.followed.take().and_then(|f| self.follow(f)) {
             Some(followed) => followed,
-            None => self.find()?,
+            None => self.find(frame)?,
         };
         Ok(self.followed.insert(followed).sighting.clone())
     }
@@ -109,7 +113,7 @@ impl Watcher {
     }
 
     fn step(&self, w: f64) -> f64 {
-        if w > 0.0 { self.code.step_inverse(1.0 / w) } else { 0.0 }
+        sensor_step(&self.code, self.words_a_step, w)
     }
 
     /// The plane through the pixels that were the target, if they still are.
@@ -134,7 +138,8 @@ impl Watcher {
         Some((fit.plane, on.count() as f64 / pixels.len() as f64, fit.scale))
     }
 
-    fn find(&self) -> Result<Followed, String> {
+    fn find(&mut self, frame: &Frame) -> Result<Followed, String> {
+        self.words_a_step = words_a_step(frame.raw.iter().copied(), &self.table);
         let image = InverseDepthImage {
             w: &self.inverse,
             rays: &self.rays,
@@ -155,4 +160,34 @@ fn corners(pixels: &[u32], rays: &Rays) -> [(f64, f64); 4] {
     let [left, right] = range(pixels.iter().map(|i| at(i).0));
     let [top, bottom] = range(pixels.iter().map(|i| at(i).1));
     [(left, top), (right, top), (left, bottom), (right, bottom)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::kinect_v1;
+    use rand_distr::{Distribution, Normal};
+
+    /// A wall at 2 m in steps of 12 mm, two thirds of it in one of them, stored in fifths of a millimetre.
+    #[test]
+    fn a_wall_in_steps_coarser_than_the_words_is_a_target() {
+        let sensor = kinect_v1(2);
+        let (width, height) = (sensor.camera.width, sensor.camera.height);
+        let rays = sensor.camera.rays();
+        let noise = Normal::new(0.0, 0.006).unwrap();
+        for theta in [0.0, 0.002, 0.2] {
+            let plane = Plane::tilted(2.0, theta, 0.3);
+            let mut rng = Seed(1).stream("wall");
+            let word = |i: usize| {
+                let z = plane.depth_at(&rays, i) + noise.sample(&mut rng);
+                sensor.code.raw(0.012 * (z / 0.012).round())
+            };
+            let frame = Frame { width, height, raw: (0..width * height).map(word).collect() };
+            let mut watcher = Watcher::new(&sensor);
+            let seen = watcher.look(&frame).expect("a wall");
+            assert!((seen.plane.depth(0.0, 0.0) - 2.0).abs() < 0.002, "{theta}: {seen:?}");
+            let target = watcher.followed.expect("followed").pixels.len();
+            assert!(2 * target > watcher.camera.pixels(), "{theta}: {target} pixels");
+        }
+    }
 }

@@ -50,7 +50,7 @@ pub(super) fn by_cell(
 /// millimetres, what steps by an eighth of a pixel. The lower quartile of the gaps between words that occur,
 /// each as often as the rarer of its two: gaps between surfaces count for little. Of two words that may be two
 /// surfaces no step is told.
-pub(super) fn words_a_step(words: impl Iterator<Item = u16>, table: &DepthTable) -> f64 {
+pub(crate) fn words_a_step(words: impl Iterator<Item = u16>, table: &DepthTable) -> f64 {
     let mut counts = vec![0u64; 1 << 16];
     words.for_each(|word| counts[usize::from(word)] += 1);
     let is_depth = |&word: &usize| counts[word] > 0 && table.metres(word as u16).is_finite();

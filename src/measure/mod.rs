@@ -18,11 +18,12 @@ mod view;
 pub use budget::flatness_uncertainty_m;
 pub use cells::{Cell, Spread};
 pub use column_steps::ColumnSteps;
+pub(crate) use grouping::words_a_step;
 pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
 pub use view::{measure_view, ranges_remark, view_target, without_copies};
 
 use crate::camera::Rays;
-use crate::frame::DepthTable;
+use crate::frame::{DepthCode, DepthTable};
 use crate::plane::{Exclusions, Plane, RansacPlane};
 use crate::rng::Seed;
 use crate::stats::{Budget, Correlation};
@@ -86,11 +87,15 @@ impl<'a> Workbench<'a> {
         }
     }
 
-    /// Step of so many words of the depth code at inverse depth `w`, 1/m.
     fn step(&self, words: f64, w: f64) -> f64 {
-        let one = if w > 0.0 { self.sensor.code.step_inverse(1.0 / w) } else { 0.0 };
-        one.max(f64::min(words * one, COARSEST_STEP))
+        sensor_step(&self.sensor.code, words, w)
     }
+}
+
+/// Step of so many words of the depth code at inverse depth `w`, 1/m.
+pub(crate) fn sensor_step(code: &DepthCode, words: f64, w: f64) -> f64 {
+    let one = if w > 0.0 { code.step_inverse(1.0 / w) } else { 0.0 };
+    one.max(f64::min(words * one, COARSEST_STEP))
 }
 
 /// All that was measured in one view.
