@@ -8,7 +8,7 @@ use super::mean::mean_inverse_depth;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
 use crate::error::{Error, Result};
-use crate::frame::{DepthTable, Frame};
+use crate::frame::Frame;
 use crate::io::{FrameSource, InfraredImage};
 use crate::plane::{
     InverseDepthImage, Points, RansacOptions, RansacPlane, Target, find_target, ransac_plane,
@@ -19,7 +19,7 @@ use crate::view::{Excluded, FrameRef, Recording, View, take_out_copies};
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
-    let mut reader = FrameReader::of(view, &mut source, &bench.table);
+    let mut reader = FrameReader::of(view, &mut source, bench);
     let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
     let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
@@ -37,7 +37,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     for (number, frame) in reader.by_ref() {
         add(number, &frame);
     }
-    let mut notes = reader.notes;
+    let mut notes = reader.into_notes(view);
     notes.extend(stray_note(view, &strays));
     let nothing = || {
         let what = "the residuals of its plane cannot be measured".into();
@@ -78,7 +78,7 @@ fn stray_note(view: &View, strays: &[usize]) -> Option<String> {
 pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(usize, Frame)>)> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
-    let mut reader = FrameReader::of(view, &mut source, &bench.table);
+    let mut reader = FrameReader::of(view, &mut source, bench);
     let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
     let target = target_of(view, bench, &held)?;
     Ok((target, numbers.into_iter().zip(held).collect()))
@@ -124,12 +124,14 @@ pub fn without_copies(recording: &Recording, views: &mut Vec<ViewMeasurement>) -
     copies.into_iter().map(told).collect()
 }
 
-/// Hands out the frames that can be read; the others are named in the notes.
+/// Hands out the frames that can be read and do not repeat the one before; the others are told in the notes.
 struct FrameReader<'r> {
     frames: std::iter::Enumerate<std::slice::Iter<'r, FrameRef>>,
     source: &'r mut FrameSource,
     notes: Vec<String>,
-    table: &'r DepthTable,
+    bench: &'r Workbench<'r>,
+    before: Vec<u16>,
+    repeated: usize,
 }
 
 fn failed(view: &View, what: String, remedy: &'static str) -> Error {
@@ -137,8 +139,21 @@ fn failed(view: &View, what: String, remedy: &'static str) -> Error {
 }
 
 impl<'r> FrameReader<'r> {
-    fn of(view: &'r View, source: &'r mut FrameSource, table: &'r DepthTable) -> Self {
-        FrameReader { frames: view.depth.iter().enumerate(), source, notes: Vec::new(), table }
+    fn of(view: &'r View, source: &'r mut FrameSource, bench: &'r Workbench<'r>) -> Self {
+        let frames = view.depth.iter().enumerate();
+        FrameReader { frames, source, notes: Vec::new(), bench, before: Vec::new(), repeated: 0 }
+    }
+
+    /// What was odd about the frames read.
+    fn into_notes(self, view: &View) -> Vec<String> {
+        let (repeated, total) = (self.repeated, view.depth.len());
+        let told = (repeated > 0).then(|| {
+            format!(
+                "{repeated} of {total} frames left out: word for word the frame before; one more measurement each, \
+                 they would falsify temporal sigma"
+            )
+        });
+        self.notes.into_iter().chain(told).collect()
     }
 
     fn hold(&mut self, view: &View) -> Result<Vec<(usize, Frame)>> {
@@ -158,7 +173,9 @@ impl Iterator for FrameReader<'_> {
     fn next(&mut self) -> Option<(usize, Frame)> {
         while let Some((number, frame_ref)) = self.frames.next() {
             match self.source.frame(frame_ref) {
-                Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
+                Ok(f) if f.raw == self.before => self.repeated += 1,
+                Ok(f) if f.raw.iter().any(|&raw| self.bench.table.metres(raw).is_finite()) => {
+                    self.before.clone_from(&f.raw);
                     return Some((number, f));
                 }
                 Ok(_) => self.notes.push(format!(
