@@ -11,6 +11,7 @@ mod finish;
 mod follow;
 mod grouping;
 mod mean;
+mod piled;
 mod scan;
 mod table;
 mod view;
