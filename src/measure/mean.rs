@@ -42,6 +42,9 @@ pub(super) fn mean_inverse_depth(
         let far = usual.max((STRAY_STEPS * bench.step(words_a_step, low)) as f32);
         if w.len() > 2 && (high - low) as f32 > far {
             let median = median_in_place(&mut w.clone());
+            let mut off: Vec<f32> = w.iter().map(|w| (w - median).abs()).collect();
+            // Nearer or steeper places may be noisier than most.
+            let far = far.max(STRAY_SIGMAS * MAD_TO_SIGMA as f32 * median_in_place(&mut off));
             w.retain(|w| (w - median).abs() <= far);
         }
         w.iter().sum::<f32>() / w.len() as f32
