@@ -183,8 +183,8 @@ impl<'a> Scan<'a> {
     fn accumulate(&mut self, frame: &Frame, own: Option<Plane>, shifts: &[f32]) {
         let follow = self.lagged.frames < HELD_FRAMES;
         let mut residuals = if follow { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
-        for cell in 0..self.cut.len() {
-            let (cut, shift) = (self.cut[cell], shifts[cell]);
+        for (cell, &shift) in shifts.iter().enumerate() {
+            let cut = self.cut[cell];
             let (mut n, mut total) = (0u32, 0f64);
             for k in self.cell_range(cell) {
                 let i = self.pixels[k] as usize;
@@ -226,10 +226,10 @@ impl<'a> Scan<'a> {
     fn own_plane(&self, frame: &Frame, shifts: &[f32]) -> Option<Plane> {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
-        for cell in 0..self.cut.len() {
+        for (cell, &shift) in shifts.iter().enumerate() {
             for k in self.cell_range(cell) {
                 let e = self.residual(frame, k);
-                if (e - shifts[cell]).abs() < self.cut[cell] {
+                if (e - shift).abs() < self.cut[cell] {
                     let (x, y) = self.bench.rays.at(self.pixels[k] as usize);
                     let ray = Vector3::new(x, y, 1.0);
                     let z = f64::from(self.expected[k]);
