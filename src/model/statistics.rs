@@ -7,6 +7,7 @@ use super::forms::{Form, SigmaForm, natural_jacobian};
 use super::rows::Rows;
 use super::surface::{Direction, Domain, SigmaModel};
 use crate::measure::SigmaRow;
+use crate::read::MAX_NUMBER;
 
 /// A parameter as reported.
 #[derive(Debug, Clone, PartialEq)]
@@ -146,7 +147,7 @@ fn covariance(
         return full;
     }
     let mut j = natural_jacobian(rows, spec, p, free);
-    let norms: Vec<f64> = j.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
+    let norms: Vec<f64> = j.column_iter().map(|c| c.norm().max(UNSEEN_NORM)).collect();
     for (mut column, norm) in j.column_iter_mut().zip(&norms) {
         column /= *norm;
     }
@@ -168,8 +169,16 @@ fn covariance(
             full[(ia, ib)] = scale * sum / (norms[a] * norms[b]);
         }
     }
-    full
+    // What no row sees at all is known to no better than a number may be.
+    let most = |i: usize| (MOST_VARIANCE / full[(i, i)].max(MOST_VARIANCE)).sqrt();
+    let most: Vec<f64> = (0..p.len()).map(most).collect();
+    DMatrix::from_fn(p.len(), p.len(), |i, j| full[(i, j)] * most[i] * most[j])
 }
+
+/// Of a parameter that a model may hold.
+const MOST_VARIANCE: f64 = 0.5 * MAX_NUMBER;
+/// A column of the Jacobian with a smaller norm is of none: its square must not run out of numbers.
+const UNSEEN_NORM: f64 = 1e-100;
 
 /// Singular values below this share of the largest are rounding: a huge but finite variance.
 const UNSEEN: f64 = 1e-10;
@@ -307,4 +316,26 @@ pub(super) fn few_views(views: usize, free: usize) -> Option<String> {
             "{seen} for {free} coefficients: the views cannot contradict the surface, and its intervals are guesses; record more views"
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::measure::{SigmaRow, SigmaTable};
+    use crate::model::Form;
+    use crate::model::fit::fit_all;
+    use crate::read::MAX_NUMBER;
+
+    /// Walls that face the sensor to a rounding: what the tilt does to sigma is not seen.
+    #[test]
+    fn what_no_view_shows_has_a_variance_that_can_be_written() {
+        let row = |view: usize| {
+            let z_m = 1.0 + 0.3 * view as f64;
+            let sigma_m = 0.0015 + 0.002 * (z_m - 0.48).powi(2);
+            SigmaRow { z_m, theta_rad: 1e-16, sigma_m, n_effective: Some(1e4), view }
+        };
+        let table = SigmaTable { rows: (0..10).map(row).collect() };
+        let fit = fit_all(&table, Form::Paper).unwrap();
+        assert!(fit.covariance.iter().all(|v| v.abs() <= MAX_NUMBER), "{}", fit.covariance);
+        assert!(fit.covariance[(1, 1)] > 0.0 && fit.covariance[(1, 1)] < 1e-3);
+    }
 }
