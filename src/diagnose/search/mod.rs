@@ -77,13 +77,32 @@ pub fn search(
     if rules.agreed {
         layer.drop_needless(&mut chosen);
     }
-    chosen.extend(layer.pinned.clone());
+    let fit = |terms: &[Chosen]| gain(&layer.together.evidence(&bases(terms)), rules.prior);
+    let (chosen, fit) = fitted_together(chosen, layer.pinned.clone(), fit);
     let evidence = layer.together.evidence(&bases(&chosen));
-    let fit = if chosen.is_empty() { None } else { gain(&evidence, rules.prior) };
     let Layer { noise, looks, together, .. } = layer;
     drop(together);
     let (noise, evidence) = (noise.unwrap_or_default(), Rc::unwrap_or_clone(evidence));
     Outcome { chosen, looks, fit, evidence, noise, ..Outcome::default() }
+}
+
+/// The terms that a fit holds together, the first chosen first and what is pinned last: between an error that is
+/// certain to a millionth of a pixel and a prior of a pixel a fit runs out of digits.
+fn fitted_together<T: Clone, F>(
+    mut chosen: Vec<T>,
+    pinned: Option<T>,
+    fit: impl Fn(&[T]) -> Option<F>,
+) -> (Vec<T>, Option<F>) {
+    loop {
+        let all: Vec<T> = chosen.iter().chain(&pinned).cloned().collect();
+        let fitted = if all.is_empty() { None } else { fit(&all) };
+        if fitted.is_some() {
+            return (all, fitted);
+        }
+        if chosen.pop().is_none() {
+            return (Vec::new(), None);
+        }
+    }
 }
 
 struct Layer<'a> {

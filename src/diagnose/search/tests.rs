@@ -297,3 +297,14 @@ fn a_search_repeats() {
     assert_eq!(one, run(2));
     assert_eq!(one, run(2));
 }
+
+/// Of three terms of which the last cannot be fitted beside the first, with one that is pinned.
+#[test]
+fn terms_that_cannot_be_fitted_are_not_told() {
+    let fit = |terms: &[char]| (!terms.contains(&'c')).then_some(terms.len());
+    let of = |chosen: &str, pinned| fitted_together(chosen.chars().collect(), pinned, fit);
+    assert_eq!(of("abc", Some('p')), (vec!['a', 'b', 'p'], Some(3)));
+    assert_eq!(of("ab", None), (vec!['a', 'b'], Some(2)));
+    assert_eq!(of("c", None), (vec![], None));
+    assert_eq!(of("", Some('c')), (vec![], None));
+}
