@@ -67,6 +67,10 @@ fn curves(scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) -> Vec<Finding> {
     layers.flat_map(|(scene, outcome)| findings::findings(scene, outcome)).collect()
 }
 
+/// Period of the finest of the three waves by which pixel-locking is looked for, px: those of a coarser step's
+/// staircase are among them.
+const LOCKING_WAVE_PX: f64 = 0.33;
+
 impl Case<'_> {
     pub fn scenes(&self) -> [Scene<'_>; 2] {
         let (survey, scale_px_m) = (&self.survey, self.fields[0].scale_px_m);
@@ -154,7 +158,9 @@ impl Case<'_> {
         let of_steps = matches!(f.statistic, Statistic::Bias | Statistic::Variance)
             && coarsest > COARSE_SIGMAS * sigma_px;
         // Steps of depth come at no period of the disparity, and pass for one over a few of them.
-        let aliased = self.lattice.depth.is_some() && f.axis == Axis::DisparityPhase;
+        let aliases = self.lattice.depth.is_some()
+            || self.lattice.disparity.is_some_and(|step| step.size > LOCKING_WAVE_PX);
+        let aliased = aliases && f.axis == Axis::DisparityPhase;
         let stepped = of_steps
             && (f.effect.is_none() || aliased)
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)

@@ -6,20 +6,23 @@ use rayon::prelude::*;
 
 /// Phases gathered more than this belong to a lattice: chance over the scanned frequencies and a
 /// hundred words reaches 0.4.
-const GATHERED: f64 = 0.6;
+pub const GATHERED: f64 = 0.6;
 /// Words wider than this share of a step cannot show it.
 pub const COARSE: f64 = 0.35;
 /// Finest and coarsest steps of the depth looked for, in units of the words: two are gathered by
 /// sin(pi / 2) / (pi / 2), just above [`GATHERED`].
-const STEPS_UNITS: [f64; 2] = [2.0, 500.0];
+pub const STEPS_UNITS: [f64; 2] = [2.0, 500.0];
 /// The range of words in which they are looked for first.
 const DENSE_UNITS: f64 = 1024.0;
-/// Coarsest and finest steps looked for, px.
-const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
+/// Coarsest and finest steps looked for by their phases alone, px: coarser ones gather readings that only
+/// have a few distances.
+pub const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
 
 /// How much the phases of places gather, 0 to 1, and how many equal places their weights are worth.
 pub struct Gathered {
     pub resultant: f64,
+    /// Mean phase, cycles.
+    pub phase: f64,
     places: f64,
 }
 
@@ -35,7 +38,7 @@ impl Gathered {
             squares += weight * weight;
         }
         let resultant = f64::hypot(c, s) / f64::max(n, 1e-9);
-        Gathered { resultant, places: n * n / squares }
+        Gathered { resultant, phase: s.atan2(c) / TAU, places: n * n / squares }
     }
 }
 
@@ -59,7 +62,7 @@ impl Comb {
         let (mut worth, mut scanned) = (0.0, 0.0);
         let mut frequency = from;
         while frequency < to {
-            let Gathered { resultant, places } = Gathered::of(at(frequency), frequency);
+            let Gathered { resultant, places, .. } = Gathered::of(at(frequency), frequency);
             if resultant > best.resultant {
                 (best.frequency, best.resultant) = (frequency, resultant);
                 worth = places;
@@ -129,9 +132,9 @@ const STEPS_WORDS: [f64; 2] = [1.15, 16.0];
 const WORDS_SCANNED: usize = 256;
 const WORD_PHASE_STEP: f64 = 0.04;
 /// Share of the readings, by the roots of their counts, that may lie in words that ought to be empty.
-const STRAY: f64 = 0.05;
+pub const STRAY: f64 = 0.05;
 /// Steps whose chance is larger are not told.
-const CHANCE: f64 = 1e-4;
+pub const CHANCE: f64 = 1e-4;
 
 /// Steps of a matcher whose answers are stored in the nearest words, which leaves words between them
 /// empty: the coarsest that explains which are, in words, and the chance of it were all as likely.

@@ -1,7 +1,9 @@
 //! Which depths occur at all: the steps of the matcher, and those of the driver.
 
+use super::coarse::{Place, coarsest_step};
 use super::comb::{
-    COARSE, Gathered, PHASE_STEP, steps_of_depths, steps_of_disparities, steps_of_words,
+    CHANCE, COARSE, Gathered, PHASE_STEP, STEPS_PX, STEPS_UNITS, steps_of_depths,
+    steps_of_disparities, steps_of_words,
 };
 use crate::frame::DepthCode;
 use crate::view::Sensor;
@@ -27,7 +29,7 @@ pub struct Quantisation {
     pub disparity: Option<Step>,
 }
 
-/// Fewer distinct words than this make no lattice.
+/// Fewer distinct words than this make no lattice that phases show.
 const MIN_WORDS: usize = 12;
 /// Neighbouring words that alternate between crowded and empty by this share.
 const CONTRAST: f64 = 0.4;
@@ -35,6 +37,11 @@ const CONTRAST: f64 = 0.4;
 const GATHERED_AT_ALL: f64 = 0.4;
 /// What a scale of the depth, or the error of a step, may change it by, as a share.
 const STEP_ERROR: f64 = 0.02;
+/// Coarsest step of the disparity looked for, px: matchers answer in whole pixels at the coarsest, of pictures
+/// that may be an eighth as wide as the one stored.
+const COARSEST_PX: f64 = 8.0;
+/// A step of which a comb is a fraction is twice as coarse at least.
+const COARSER: f64 = 1.5;
 
 impl Quantisation {
     pub fn is_some(&self) -> bool {
@@ -66,48 +73,94 @@ impl RawHistogram {
             .collect()
     }
 
+    /// Of the words of a picture.
+    pub fn count(&mut self, words: impl Iterator<Item = u16>) {
+        words.for_each(|w| self.0[usize::from(w)] += 1);
+    }
+
+    /// Are there too few words for a lattice to show by how often each occurs?
+    pub fn is_few(&self) -> bool {
+        self.0.iter().filter(|n| **n > 0).take(MIN_WORDS).count() < MIN_WORDS
+    }
+
     /// The lattice the words lie on.
     pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Quantisation {
-        let words = self.occurring();
-        if words.len() < MIN_WORDS {
-            return Quantisation::default();
-        }
-        let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
-                let of_depth = |size, p| Step { size: size / units_per_metre, p };
-                if stride > 1 {
-                    let p = all_multiples(stride, words.len());
-                    let depth = Some(of_depth(stride as f64, Some(p)));
-                    return Quantisation { depth, disparity: None };
-                }
-                if self.contrast(&words) < CONTRAST {
-                    return Quantisation::default();
-                }
-                let disparity = steps_of_disparities(&words, scale_px_m * units_per_metre);
-                let depth = steps_of_depths(&words);
-                if depth.resultant > disparity.resultant {
-                    let depth = depth.step().map(|size| of_depth(size, Some(depth.p)));
-                    return Quantisation { depth, disparity: None };
-                }
-                let p = Some(disparity.p);
-                let disparity = disparity.step().map(|size| Step { size, p });
-                Quantisation { depth: None, disparity }
+                self.of_depths(units_per_metre, scale_px_m)
             }
-            DepthCode::Disparity { slope, .. } => {
-                // Words are the lattice; what is left to see is whether a coarser one leaves some empty.
-                let word_px = slope.abs() * scale_px_m;
-                let stride = words.iter().fold(0, |g, (w, _)| gcd(g, w - words[0].0));
-                let coarser = if stride > 1 {
-                    Some((stride as f64, all_multiples(stride, words.len() - 1)))
-                } else {
-                    steps_of_words(&words)
-                };
-                let size = coarser.map_or(1.0, |c| c.0) * word_px;
-                let disparity = Some(Step { size, p: coarser.map(|c| c.1) });
-                Quantisation { depth: None, disparity }
+            // Words are the lattice; what is left to see is whether a coarser one leaves some empty.
+            DepthCode::Disparity { slope, .. } => self.of_raw_words(slope.abs() * scale_px_m),
+        }
+    }
+
+    fn of_depths(&self, units_per_metre: f64, scale_px_m: f64) -> Quantisation {
+        let words = self.occurring();
+        let of_depth = |size, p| Step { size: size / units_per_metre, p: Some(p) };
+        let of_depth = |(size, p)| Quantisation { depth: Some(of_depth(size, p)), disparity: None };
+        let of_disparity =
+            |(size, p)| Quantisation { depth: None, disparity: Some(Step { size, p: Some(p) }) };
+        let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
+        let by_chance = all_multiples(stride, words.len());
+        if stride > 1 && by_chance < CHANCE {
+            return of_depth((stride as f64, by_chance));
+        }
+        if words.is_empty() || self.contrast(&words) < CONTRAST {
+            return Quantisation::default();
+        }
+        let px_words = scale_px_m * units_per_metre;
+        let few = words.len() < MIN_WORDS;
+        let (disparity, depth) = if few {
+            Default::default()
+        } else {
+            (steps_of_disparities(&words, px_words), steps_of_depths(&words))
+        };
+        let place = |at, width, n: f64| Place { at, width, weight: n.sqrt() };
+        // A comb tells a step or a fraction of it.
+        let coarser = |step: Option<f64>, finest| step.map_or(finest, |s: f64| COARSER * s);
+        let coarse_px = {
+            let of_word = |&(w, n): &(usize, f64)| {
+                let w = w as f64;
+                place(px_words / w, px_words / (w * w), n)
+            };
+            let places: Vec<Place> = words.iter().map(of_word).collect();
+            coarsest_step(&places, [COARSEST_PX, coarser(disparity.step(), STEPS_PX[0])])
+        };
+        let coarse_units = (few || depth.step().is_some()).then(|| {
+            let places: Vec<Place> = words.iter().map(|&(w, n)| place(w as f64, 1.0, n)).collect();
+            let [finest, coarsest] = STEPS_UNITS;
+            coarsest_step(&places, [coarsest, coarser(depth.step(), finest)])
+        });
+        match (coarse_px, coarse_units.flatten()) {
+            (Some(px), Some(units)) if units.1 < px.1 => of_depth(units),
+            (Some(px), _) => of_disparity(px),
+            (None, Some(units)) => of_depth(units),
+            (None, None) if depth.resultant > disparity.resultant => {
+                depth.step().map(|size| of_depth((size, depth.p))).unwrap_or_default()
+            }
+            (None, None) => {
+                disparity.step().map(|size| of_disparity((size, disparity.p))).unwrap_or_default()
             }
         }
+    }
+
+    fn of_raw_words(&self, word_px: f64) -> Quantisation {
+        let words = self.occurring();
+        let Some(first) = words.first() else { return Quantisation::default() };
+        let few = words.len() < MIN_WORDS;
+        let stride = words.iter().fold(0, |g, (w, _)| gcd(g, w - first.0));
+        let coarser = if stride > 1 {
+            Some((stride as f64, all_multiples(stride, words.len() - 1)))
+        } else {
+            (!few).then(|| steps_of_words(&words)).flatten()
+        };
+        let coarser = coarser.filter(|c| !few || c.1 < CHANCE);
+        if few && coarser.is_none() {
+            return Quantisation::default();
+        }
+        let size = coarser.map_or(1.0, |c| c.0) * word_px;
+        let disparity = Some(Step { size, p: coarser.map(|c| c.1) });
+        Quantisation { depth: None, disparity }
     }
 
     /// Do the disparities lie on a lattice of this step, give or take what a scale or its own error
@@ -241,5 +294,19 @@ mod tests {
             assert!(found.disparity.is_none() && step.p.is_some_and(|p| p < 1e-9));
         }
         assert_eq!(words(0.0, 0.0).lattice(&sensor, 43.5), Quantisation::default());
+    }
+
+    /// Of targets in a few words, one of which the rounding to 0.2 mm has settled by chance.
+    #[test]
+    fn a_coarse_step_shows_in_few_words() {
+        let sensor = kinect_v1(2);
+        let counts = [10, 75, 382, 75, 66, 5, 75, 255, 35, 4, 158];
+        let words = [3398, 3625, 3884, 4183, 4531, 4943, 5437, 6042, 6797, 7768, 9063];
+        let mut histogram = RawHistogram::none();
+        let readings = words.iter().zip(counts);
+        histogram.count(readings.flat_map(|(word, n)| std::iter::repeat_n(*word, 1000 * n)));
+        assert!(histogram.is_few());
+        let found = histogram.lattice(&sensor, 21.75).disparity.expect("a step");
+        assert!((found.size / 2.0 - 1.0).abs() < 1e-3, "{found:?}");
     }
 }

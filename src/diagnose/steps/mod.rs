@@ -1,5 +1,6 @@
 //! Steps of the words, and the variance that comes by other names than sigma.
 
+mod coarse;
 pub mod comb;
 pub mod lattice;
 
@@ -61,12 +62,15 @@ pub(in crate::diagnose) fn lattice<'a>(
     fields: impl IntoIterator<Item = &'a Field>,
     recording: &Recording,
 ) -> Quantisation {
-    let mut words = RawHistogram::none();
+    let (mut words, mut pictures) = (RawHistogram::none(), RawHistogram::none());
     let mut scale_px_m = 0.0;
     for f in fields {
         words.merge(&f.words);
+        pictures.merge(&f.pictures);
         scale_px_m = f.scale_px_m;
     }
+    // In steps coarser than a target is deep, a target has one word.
+    let words = if words.is_few() { pictures } else { words };
     words.lattice(&recording.sensor, scale_px_m)
 }
 

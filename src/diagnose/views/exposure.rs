@@ -146,6 +146,10 @@ impl Field {
                 sxy += x * f64::from(e);
             }
         }
+        if self.words.is_few() {
+            let is_depth = |word: &u16| table.metres(*word).is_finite();
+            self.pictures.count(frame.raw.iter().copied().filter(is_depth));
+        }
         if keep {
             self.first.push(residuals);
         }

@@ -67,6 +67,8 @@ pub struct Field {
     pub infrared: Option<f64>,
     /// How often each stored word occurs on the target.
     pub words: RawHistogram,
+    /// The same anywhere in the pictures, where the target has few words.
+    pub pictures: RawHistogram,
     /// The target's region was given; else it ends where too little is measured.
     pub region_given: bool,
     /// Where the target ends before something else.
@@ -129,6 +131,7 @@ impl Field {
             lines: Vec::new(),
             column_steps: None,
             words: RawHistogram::none(),
+            pictures: RawHistogram::none(),
             ..self.clone()
         };
         field.accumulate(frames, bench, sigma, known, session_start);
@@ -243,6 +246,7 @@ impl Field {
             light: Vec::new(),
             infrared: None,
             words: RawHistogram::none(),
+            pictures: RawHistogram::none(),
             region_given: false,
             edges: Edges::default(),
         };
