@@ -1,4 +1,4 @@
-//! Single columns, or rows, that err by a constant each: told as such, and learnt.
+//! Single columns, or rows, that err by a constant each: told as such, and learnt. And rows that err afresh.
 
 use kinoise::diagnose::{DiagnoseOptions, Diagnosed, Status, Verdict, diagnose};
 use kinoise::effects::Active;
@@ -7,29 +7,35 @@ use kinoise::model::{Effect, UNEXPLAINED};
 use kinoise::scene::Target;
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
 use kinoise::terms::{Axis, Basis, Coordinate, Modulation, Statistic, Term};
-use kinoise::{NoiseModel, Seed, SigmaModel};
+use kinoise::{NoiseModel, Recording, Seed, SigmaModel};
+use tempfile::TempDir;
 
 /// A quarter of a Kinect's picture each way.
 const BINNING: usize = 4;
 const SIZE: [usize; 2] = [160, 120];
 
-/// A wall in twelve views of six frames, with this error at each column (row), px, held against the plain model.
-fn diagnosis(over: Coordinate, error_px: impl Fn(usize) -> f64) -> Diagnosed {
-    let nodes = if over == Coordinate::Row { SIZE[1] } else { SIZE[0] };
-    let high = nodes as f64 - 1.0;
-    let basis = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
-    let shape = vec![Term::bias(basis, (0..nodes).map(error_px).collect())];
-    let effect = Effect { id: UNEXPLAINED.into(), shape, ..Effect::default() };
+/// A wall in twelve views of six frames.
+fn wall(effects: Vec<Active>) -> (TempDir, Recording) {
     let folder = tempfile::tempdir().expect("a folder");
     let tilts_rad = vec![0.0, 0.3, 0.6];
     let poses = Grid { distances_m: vec![1.0, 1.5, 2.0, 2.5], tilts_rad }.views();
     let sigma = SigmaModel::paper();
     let (sensor, target) = (kinect_v1(BINNING), Target::Wall);
     let mut shoot = Shoot::plain(sensor, target, &poses, 6, sigma.clone(), Seed(11));
-    let effects = Active::all_of_model(&[effect]).expect("effects");
     shoot.physics = Physics::Formula { sigma, effects };
     shoot.write(folder.path(), &|_, _| ()).expect("written");
     let recording = open(folder.path(), &Assumed::default()).expect("a recording");
+    (folder, recording)
+}
+
+/// With this error at each column (row), px, held against the plain model.
+fn diagnosis(over: Coordinate, error_px: impl Fn(usize) -> f64) -> Diagnosed {
+    let nodes = if over == Coordinate::Row { SIZE[1] } else { SIZE[0] };
+    let high = nodes as f64 - 1.0;
+    let basis = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
+    let shape = vec![Term::bias(basis, (0..nodes).map(error_px).collect())];
+    let effect = Effect { id: UNEXPLAINED.into(), shape, ..Effect::default() };
+    let (_folder, recording) = wall(Active::all_of_model(&[effect]).expect("effects"));
     let options = DiagnoseOptions::default();
     diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ()).expect("diagnosed")
 }
@@ -66,5 +72,27 @@ fn lines_of_two_readouts_are_seen_and_learnt() {
         let (n, along) = (known().count(), known().map(|(k, c)| c / error_px(k)).sum::<f64>());
         let height = along / n as f64;
         assert!(n > SIZE[1] / 2 && (height - 1.0).abs() < 0.25, "{height} of {n} {axis:?}");
+    }
+}
+
+/// In half of the views, and in three quarters: the noise has its name, and where a tilted target's disparity goes
+/// with the row it is no error of the mean.
+#[test]
+fn rows_that_err_afresh_in_a_part_of_the_views_are_row_noise_and_no_bias() {
+    let effect = Active::parse("row-noise:sigma_px=0.03").expect("an effect");
+    let (_noisy, noisy) = wall(vec![effect]);
+    let (_plain, plain) = wall(Vec::new());
+    for some in [6, 9] {
+        let views = noisy.views[..some].iter().chain(&plain.views[some..]).cloned().collect();
+        let recording = Recording { views, ..plain.clone() };
+        let (model, options) = (NoiseModel::paper(), DiagnoseOptions::default());
+        let said = diagnose(&recording, &model, &options, &|_, _| ()).expect("diagnosed").diagnosis;
+        let rows = said.findings.iter().find(|f| f.effect == Some("row-noise")).expect("its name");
+        assert_eq!(rows.status, Status::Named);
+        let sigma_px = rows.value("sigma_px").expect("a size");
+        assert!((sigma_px / 0.03 - 1.0).abs() < 0.1, "{sigma_px} in {some} views");
+        let bias = said.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
+        let bias: Vec<_> = bias.filter(|f| f.statistic == Statistic::Bias).collect();
+        assert!(bias.is_empty(), "{some}: {bias:?}");
     }
 }
