@@ -6,13 +6,14 @@ use std::fmt;
 use super::Workbench;
 use crate::frame::Frame;
 
-/// A pile is so many times as frequent as any of the words beside it. Noise leaves few at its end.
-const TIMES_BESIDE: u64 = 5;
+/// A pile is so many times as frequent as any of the words beside it: noise of a quarter of a step, less than a Kinect
+/// has on a frontal wall, leaves one reading in 43 in either of them.
+const TIMES_BESIDE: u64 = 50;
 const BESIDE: usize = 4;
 /// Of the readings; fewer harm nothing.
-const LEAST_SHARE: f64 = 0.01;
+const MIN_SHARE: f64 = 0.01;
 /// Noise of fewer words tells no end from a middle.
-const LEAST_WORDS: usize = 8;
+const MIN_WORDS: usize = 8;
 
 /// The word at an end of all that a view's frames hold, if readings pile up there.
 #[derive(Debug)]
@@ -42,14 +43,14 @@ impl Piled {
         let total: u64 = seen.iter().map(|&word| counts[word]).sum();
         let is_pile = |word: usize, beside: &mut dyn Iterator<Item = &usize>| {
             let most = beside.take(BESIDE).map(|&other| counts[other]).max().unwrap_or(0);
-            counts[word] > TIMES_BESIDE * most && counts[word] as f64 > LEAST_SHARE * total as f64
+            counts[word] > TIMES_BESIDE * most && counts[word] as f64 > MIN_SHARE * total as f64
         };
         let (&first, &last) = (seen.first()?, seen.last()?);
         let ends = [
             (first, is_pile(first, &mut seen.iter().skip(1))),
             (last, is_pile(last, &mut seen.iter().rev().skip(1))),
         ];
-        let (word, _) = ends.into_iter().find(|end| seen.len() >= LEAST_WORDS && end.1)?;
+        let (word, _) = ends.into_iter().find(|end| seen.len() >= MIN_WORDS && end.1)?;
         let shown = |i: &usize| frames.clone().any(|frame| usize::from(frame.raw[*i]) == word);
         let pixels = (0..bench.sensor.camera.pixels()).filter(shown).collect();
         Some(Piled {

@@ -170,13 +170,13 @@ fn covariance(
         }
     }
     // What no row sees at all is known to no better than a number may be.
-    let most = |i: usize| (MOST_VARIANCE / full[(i, i)].max(MOST_VARIANCE)).sqrt();
-    let most: Vec<f64> = (0..p.len()).map(most).collect();
-    DMatrix::from_fn(p.len(), p.len(), |i, j| full[(i, j)] * most[i] * most[j])
+    let cap = |i: usize| (MAX_VARIANCE / full[(i, i)].max(MAX_VARIANCE)).sqrt();
+    let caps: Vec<f64> = (0..p.len()).map(cap).collect();
+    DMatrix::from_fn(p.len(), p.len(), |i, j| full[(i, j)] * caps[i] * caps[j])
 }
 
 /// Of a parameter that a model may hold.
-const MOST_VARIANCE: f64 = 0.5 * MAX_NUMBER;
+const MAX_VARIANCE: f64 = 0.5 * MAX_NUMBER;
 /// A column of the Jacobian with a smaller norm is of none: its square must not run out of numbers.
 const UNSEEN_NORM: f64 = 1e-100;
 
