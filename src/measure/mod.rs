@@ -11,7 +11,6 @@ mod finish;
 mod follow;
 mod grouping;
 mod mean;
-mod piled;
 mod scan;
 mod table;
 mod view;

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use super::budget::distance_budget;
 use super::grouping::words_a_step;
 use super::mean::mean_inverse_depth;
-use super::piled::Piled;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
 use crate::error::{Error, Result};
@@ -22,7 +21,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     let mut source = FrameSource::new(camera.width, camera.height);
     let mut reader = FrameReader::of(view, &mut source, bench);
     let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
-    let target = target_of(view, bench, &held, reader.piled.as_ref())?;
+    let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
     let mut strays: Vec<usize> = Vec::new();
     let mut add = |number: usize, frame: &Frame| {
@@ -50,12 +49,6 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     notes.extend(target.notes.iter().cloned());
     let measured = scan.finish(&target, first).ok_or_else(nothing)?;
     notes.extend(measured.notes);
-    if measured.whole.spread.total_m < NO_NOISE * measured.whole.z_m {
-        notes.push(format!(
-            "all of the target has one depth, {:.3} m: it is cut off there, or made up; leave the view out",
-            measured.whole.z_m
-        ));
-    }
     let mut measured = ViewMeasurement {
         name: view.name.clone(),
         time_s: view.depth[0].timestamp,
@@ -70,9 +63,6 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     measured.distance_budget = distance_budget(&measured, &view.notes, bench.sensor);
     Ok(measured)
 }
-
-/// Of the distance: what arithmetic leaves of a target in which all readings are alike.
-const NO_NOISE: f64 = 1e-6;
 
 fn stray_note(view: &View, strays: &[usize]) -> Option<String> {
     let first = view.depth[*strays.first()?].place();
@@ -90,7 +80,7 @@ pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(u
     let mut source = FrameSource::new(camera.width, camera.height);
     let mut reader = FrameReader::of(view, &mut source, bench);
     let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
-    let target = target_of(view, bench, &held, reader.piled.as_ref())?;
+    let target = target_of(view, bench, &held)?;
     Ok((target, numbers.into_iter().zip(held).collect()))
 }
 
@@ -140,7 +130,6 @@ struct FrameReader<'r> {
     source: &'r mut FrameSource,
     notes: Vec<String>,
     bench: &'r Workbench<'r>,
-    piled: Option<Piled>,
     before: Vec<u16>,
     repeated: usize,
 }
@@ -152,15 +141,7 @@ fn failed(view: &View, what: String, remedy: &'static str) -> Error {
 impl<'r> FrameReader<'r> {
     fn of(view: &'r View, source: &'r mut FrameSource, bench: &'r Workbench<'r>) -> Self {
         let frames = view.depth.iter().enumerate();
-        FrameReader {
-            frames,
-            source,
-            notes: Vec::new(),
-            bench,
-            piled: None,
-            before: Vec::new(),
-            repeated: 0,
-        }
+        FrameReader { frames, source, notes: Vec::new(), bench, before: Vec::new(), repeated: 0 }
     }
 
     /// What was odd about the frames read.
@@ -176,15 +157,10 @@ impl<'r> FrameReader<'r> {
     }
 
     fn hold(&mut self, view: &View) -> Result<Vec<(usize, Frame)>> {
-        let mut held: Vec<(usize, Frame)> = self.by_ref().take(HELD_FRAMES).collect();
+        let held: Vec<(usize, Frame)> = self.by_ref().take(HELD_FRAMES).collect();
         if held.is_empty() {
             let why = self.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
             return Err(failed(view, why, "record the view again"));
-        }
-        self.piled = Piled::among(held.iter().map(|(_, frame)| frame), self.bench);
-        if let Some(piled) = &self.piled {
-            self.notes.push(piled.to_string());
-            held.iter_mut().for_each(|(_, frame)| piled.take_out(frame));
         }
         Ok(held)
     }
@@ -198,9 +174,8 @@ impl Iterator for FrameReader<'_> {
         while let Some((number, frame_ref)) = self.frames.next() {
             match self.source.frame(frame_ref) {
                 Ok(f) if f.raw == self.before => self.repeated += 1,
-                Ok(mut f) if f.raw.iter().any(|&raw| self.bench.table.metres(raw).is_finite()) => {
+                Ok(f) if f.raw.iter().any(|&raw| self.bench.table.metres(raw).is_finite()) => {
                     self.before.clone_from(&f.raw);
-                    self.piled.iter().for_each(|piled| piled.take_out(&mut f));
                     return Some((number, f));
                 }
                 Ok(_) => self.notes.push(format!(
@@ -214,12 +189,7 @@ impl Iterator for FrameReader<'_> {
     }
 }
 
-fn target_of(
-    view: &View,
-    bench: &Workbench<'_>,
-    held: &[Frame],
-    piled: Option<&Piled>,
-) -> Result<Target> {
+fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
     let words = held.iter().flat_map(|frame| frame.raw.iter().copied());
     let words_a_step = words_a_step(words, &bench.table);
     let mut w = mean_inverse_depth(held, bench, words_a_step);
@@ -238,10 +208,8 @@ fn target_of(
     };
     let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
     let remedy = "give the target's region in view.json (roi or polygon), or record the view again";
-    find_target(&image, view.notes.region.as_ref(), &mut rng).map_err(|what| {
-        let why = piled.map_or_else(String::new, |piled| format!("; {piled}"));
-        failed(view, what + &why, remedy)
-    })
+    find_target(&image, view.notes.region.as_ref(), &mut rng)
+        .map_err(|what| failed(view, what, remedy))
 }
 
 /// Mean amplitude over the target in the view's first readable infrared image.
