@@ -19,7 +19,9 @@ use super::finding::scene::Scene;
 use super::joint::anchor::{anchor, let_planes_be};
 use super::missing::shapes::Step;
 use super::search::outcome::Outcome;
-use super::verdict::{extend, few_frames, not_identifiable, shares, untested, verdict};
+use super::verdict::{
+    extend, few_frames, not_identifiable, repeated_frames, shares, untested, verdict,
+};
 use super::views::between::between;
 use super::views::field::Field;
 use super::views::known::KnownTerms;
@@ -80,6 +82,7 @@ impl Case<'_> {
         remarks.append(&mut self.remarks());
         remarks.extend(untested(outcomes, self.survey.block_tiles));
         remarks.extend(few_frames(&self.fields));
+        remarks.extend(repeated_frames(&self.fields));
         remarks.extend(better_form);
         let told = found.iter().chain(&refitted);
         let mut extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);

@@ -126,14 +126,23 @@ pub(super) fn few_frames(fields: &[Field]) -> Option<String> {
     let most = |n: usize| 2 * fields.iter().filter(|f| f.frames.len() <= n).count() > fields.len();
     let (has, what) = if most(1) {
         (
-            "one frame",
+            "have one frame",
             "noise that a view's frames or its rows have in common, frames that jitter and a target that moves",
         )
     } else {
-        ("two frames", "frames that jitter and a target that moves")
+        ("have two frames at most", "frames that jitter and a target that moves")
     };
     most(2).then(|| {
-        format!("a view has {has}: {what} were not looked for; record four or more frames a view")
+        format!("most views {has}: {what} were not looked for; record four or more frames a view")
+    })
+}
+
+/// Frames that a view has twice.
+pub(super) fn repeated_frames(fields: &[Field]) -> Option<String> {
+    let repeated: usize = fields.iter().map(|f| f.repeated).sum();
+    let all: usize = fields.iter().map(|f| f.repeated + f.frames.len()).sum();
+    (repeated > 0).then(|| {
+        format!("{repeated} of {all} frames were left out: they are word for word the frame before")
     })
 }
 

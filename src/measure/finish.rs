@@ -29,9 +29,11 @@ impl Scan<'_> {
         let context = self.context(&correlation, temporal_correlation);
         let (cells, trusted, mut notes) = trusted_cells(&sums, &context);
         notes.extend(self.follow.drift_sigmas().map(|sigmas| {
+            let way = if sigmas > 0.0 { "farther away" } else { "nearer" };
             format!(
-                "the target moves away by {sigmas:+.1} of its sigmas from its first frames to its last: it, the \
-                 sensor or its temperature drifts, which temporal sigma holds and spatial sigma does not"
+                "the target is {:.1} of its sigmas {way} in its last frames than in its first: it, the sensor or its \
+                 temperature drifts, which temporal sigma holds and spatial sigma does not",
+                sigmas.abs()
             )
         }));
         let whole = context.cell(&trusted)?;

@@ -12,6 +12,10 @@ pub(super) const NO_SHIFT: f32 = 0.07;
 /// A drift of fewer standard deviations is not worth a note.
 const NOTED_SIGMAS: f32 = 1.0;
 
+/// Standard errors by which a drift is clear of frames that jitter: of eight frames t has two degrees of freedom, and
+/// one in forty is beyond; a steady drift has 8.
+const CLEARLY: f32 = 6.0;
+
 /// What is known of where the cells were, m.
 pub(super) struct Follow {
     /// Frames that the cuts come from.
@@ -37,13 +41,21 @@ impl Follow {
         if near { offset } else { 0.0 }
     }
 
-    /// By how many standard deviations the last quarter of the frames lies off the first.
+    /// By how many standard deviations the last quarter of the frames lies off the first, if by more than frames
+    /// that jitter do.
     pub fn drift_sigmas(&self) -> Option<f32> {
         let quarter = self.path.len() / 4;
+        if quarter < 2 {
+            return None;
+        }
+        let (first, last) = (&self.path[..quarter], &self.path[self.path.len() - quarter..]);
         let mean = |part: &[f32]| part.iter().sum::<f32>() / quarter as f32;
-        let last = self.path.len() - quarter;
-        let drift = CUT_SIGMAS as f32 * (mean(&self.path[last..]) - mean(&self.path[..quarter]));
-        (drift.abs() > NOTED_SIGMAS).then_some(drift)
+        let squares = |part: &[f32]| part.iter().map(|x| (x - mean(part)).powi(2)).sum::<f32>();
+        let scatter = (squares(first) + squares(last)) / (2 * quarter - 2) as f32;
+        let drift = mean(last) - mean(first);
+        let sigmas = CUT_SIGMAS as f32 * drift;
+        let clear = drift.abs() > CLEARLY * (2.0 * scatter / quarter as f32).sqrt();
+        (clear && sigmas.abs() > NOTED_SIGMAS).then_some(sigmas)
     }
 }
 

@@ -67,7 +67,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
 fn stray_note(view: &View, strays: &[usize]) -> Option<String> {
     let first = view.depth[*strays.first()?].place();
     Some(format!(
-        "{} of {} frames left out, the first is {first}: most of the target is not where the other frames show it; \
+        "{} of {} frames left out, the first is {first}: most of the target is not where the first frames show it; \
          such a frame is stale or damaged, or something was moved",
         strays.len(),
         view.depth.len()
@@ -149,8 +149,8 @@ impl<'r> FrameReader<'r> {
         let (repeated, total) = (self.repeated, view.depth.len());
         let told = (repeated > 0).then(|| {
             format!(
-                "{repeated} of {total} frames left out: word for word the frame before; one more measurement each, \
-                 they would falsify temporal sigma"
+                "{repeated} of {total} frames left out: word for word the frame before; counted as \
+                 measurements of their own they would make temporal sigma wrong"
             )
         });
         self.notes.into_iter().chain(told).collect()

@@ -286,3 +286,33 @@ fn a_copy_of_a_view_is_no_other_view() {
     assert_eq!(told, ["0003", "0007"].map(same));
     assert_eq!(once, twice);
 }
+
+/// A driver that hands out frames twice: neither the measurement nor the diagnosis is surer for it, nor sees it as noise
+/// that stands still.
+#[test]
+fn a_frame_stored_twice_is_one_frame() {
+    let recording = io::open(good(), &io::Assumed::default()).expect("a recording");
+    let mut doubled = recording.clone();
+    for view in &mut doubled.views {
+        view.depth = view.depth.iter().flat_map(|frame| [frame.clone(), frame.clone()]).collect();
+    }
+    let judged = |recording: &Recording| {
+        let options = CalibrateOptions::default();
+        let measured =
+            measure_recording(recording, &options.measure, &|_, _| ()).expect("measured");
+        let fit = model_of(recording, &measured, &options).expect("a model").model.fit;
+        let (model, options) = (NoiseModel::paper(), DiagnoseOptions::default());
+        let told = diagnose(recording, &model, &options, &|_, _| ()).expect("diagnosed").diagnosis;
+        let findings = serde_json::to_string(&told.findings).expect("findings");
+        (fit, findings, told.remarks)
+    };
+    let [(once, found, _), (twice, found_twice, remarks)] = [&recording, &doubled].map(judged);
+    assert_eq!(once, twice);
+    assert_eq!(found, found_twice);
+    let frames: usize = recording.views.iter().map(|v| v.depth.len()).sum();
+    let told = format!(
+        "{frames} of {} frames were left out: they are word for word the frame before",
+        2 * frames
+    );
+    assert!(remarks.contains(&told), "{remarks:?}");
+}

@@ -150,6 +150,9 @@ fn beyond_borders(views: &[EdgeLoss]) -> f64 {
         products.fold((0.0, 0.0, 0.0), |(own, cross, square), [lost, wide]| {
             (own + lost * lost, cross + lost * wide, square + wide * wide)
         });
+    if square <= 0.0 {
+        return 1.0;
+    }
     let borders = MIN_VIEWS as f64;
     let freedom = views.len() as f64 - 1.0 + borders;
     let scatter = (own - cross * cross / square + borders * BORDER_PX.powi(2)) / freedom;

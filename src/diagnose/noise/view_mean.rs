@@ -26,8 +26,10 @@ impl ViewMean {
     /// with its length squared.
     pub fn of_lines(views: &[Structure], axis: usize) -> Option<Self> {
         let variance = variance_px2(views);
-        let of =
-            |s: &Structure| Some(([s.row_px2, s.column_px2][axis]?, s.line_size(axis, variance)));
+        let of = |s: &Structure| {
+            let px2 = [s.row_px2, s.column_px2][axis].filter(|px2| px2.is_finite());
+            Some((px2?, s.line_size(axis, variance)))
+        };
         ViewMean::weighed(&views.iter().filter_map(of).collect::<Vec<_>>())
     }
 

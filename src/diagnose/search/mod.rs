@@ -87,22 +87,26 @@ pub fn search(
 }
 
 /// The terms that a fit holds together, the first chosen first and what is pinned last: between an error that is
-/// certain to a millionth of a pixel and a prior of a pixel a fit runs out of digits.
+/// certain to a millionth of a pixel and a prior of a pixel a fit runs out of digits, and a term that then
+/// does not fit beside those before it is not told.
 fn fitted_together<T: Clone, F>(
-    mut chosen: Vec<T>,
+    chosen: Vec<T>,
     pinned: Option<T>,
     fit: impl Fn(&[T]) -> Option<F>,
 ) -> (Vec<T>, Option<F>) {
-    loop {
-        let all: Vec<T> = chosen.iter().chain(&pinned).cloned().collect();
-        let fitted = if all.is_empty() { None } else { fit(&all) };
-        if fitted.is_some() {
-            return (all, fitted);
-        }
-        if chosen.pop().is_none() {
-            return (Vec::new(), None);
+    let all: Vec<T> = chosen.into_iter().chain(pinned).collect();
+    let fitted = if all.is_empty() { None } else { fit(&all) };
+    if all.is_empty() || fitted.is_some() {
+        return (all, fitted);
+    }
+    let mut kept: (Vec<T>, Option<F>) = (Vec::new(), None);
+    for term in all {
+        let more: Vec<T> = kept.0.iter().cloned().chain([term]).collect();
+        if let Some(fitted) = fit(&more) {
+            kept = (more, Some(fitted));
         }
     }
+    kept
 }
 
 struct Layer<'a> {

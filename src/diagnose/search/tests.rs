@@ -298,7 +298,7 @@ fn a_search_repeats() {
     assert_eq!(one, run(2));
 }
 
-/// Of three terms of which the last cannot be fitted beside the first, with one that is pinned.
+/// Of terms of which one cannot be fitted, wherever it stands.
 #[test]
 fn terms_that_cannot_be_fitted_are_not_told() {
     let fit = |terms: &[char]| (!terms.contains(&'c')).then_some(terms.len());
@@ -306,5 +306,7 @@ fn terms_that_cannot_be_fitted_are_not_told() {
     assert_eq!(of("abc", Some('p')), (vec!['a', 'b', 'p'], Some(3)));
     assert_eq!(of("ab", None), (vec!['a', 'b'], Some(2)));
     assert_eq!(of("c", None), (vec![], None));
+    assert_eq!(of("cab", None), (vec!['a', 'b'], Some(2)));
+    assert_eq!(of("ab", Some('c')), (vec!['a', 'b'], Some(2)));
     assert_eq!(of("", Some('c')), (vec![], None));
 }

@@ -31,6 +31,8 @@ pub struct Quantisation {
 
 /// Fewer distinct words than this make no lattice that phases show.
 const MIN_WORDS: usize = 12;
+/// And than this none at all: two settle it, and chance is to be ruled out by three at least.
+const MIN_FEW: usize = 5;
 /// Neighbouring words that alternate between crowded and empty by this share.
 const CONTRAST: f64 = 0.4;
 /// Phases gathered less than this belong to none: a dozen words by chance gather so much.
@@ -102,14 +104,17 @@ impl RawHistogram {
             |(size, p)| Quantisation { depth: None, disparity: Some(Step { size, p: Some(p) }) };
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         let by_chance = all_multiples(stride, words.len());
-        if stride > 1 && by_chance < CHANCE {
+        let few = words.len() < MIN_WORDS;
+        // A handful of round distances is no step.
+        let by_few =
+            words.len() >= MIN_FEW && by_chance < CHANCE && stride <= STEPS_UNITS[1] as usize;
+        if stride > 1 && (!few || by_few) {
             return of_depth((stride as f64, by_chance));
         }
         if words.is_empty() || self.contrast(&words) < CONTRAST {
             return Quantisation::default();
         }
         let px_words = scale_px_m * units_per_metre;
-        let few = words.len() < MIN_WORDS;
         let (disparity, depth) = if few {
             Default::default()
         } else {
@@ -126,10 +131,10 @@ impl RawHistogram {
             let places: Vec<Place> = words.iter().map(of_word).collect();
             coarsest_step(&places, [COARSEST_PX, coarser(disparity.step(), STEPS_PX[0])])
         };
-        let coarse_units = (few || depth.step().is_some()).then(|| {
+        let coarse_units = few.then(|| {
             let places: Vec<Place> = words.iter().map(|&(w, n)| place(w as f64, 1.0, n)).collect();
             let [finest, coarsest] = STEPS_UNITS;
-            coarsest_step(&places, [coarsest, coarser(depth.step(), finest)])
+            coarsest_step(&places, [coarsest, finest])
         });
         match (coarse_px, coarse_units.flatten()) {
             (Some(px), Some(units)) if units.1 < px.1 => of_depth(units),

@@ -53,6 +53,8 @@ pub struct Field {
     pub first: Vec<Vec<f32>>,
     /// Time and mean residual of each frame, s since the first and px.
     pub frames: Vec<(f64, f64)>,
+    /// Frames that are word for word the one before, and were left out.
+    pub repeated: usize,
     /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
     pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
@@ -97,6 +99,9 @@ impl Field {
         let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
+        // Frames that repeat the one before were left out there; if all do, nothing in the view moves.
+        let repeats = held.len() > 1;
+        let (mut before, mut repeated) = (Vec::new(), 0);
         let mut held = held.into_iter().peekable();
         // Frames that showed the target are not read twice.
         let frames = view.depth.iter().enumerate().filter_map(|(number, frame)| {
@@ -104,9 +109,15 @@ impl Field {
                 Some((_, image)) => image,
                 None => read_depth(frame, camera.width, camera.height).ok()?,
             };
+            if repeats && image.raw == before {
+                repeated += 1;
+                return None;
+            }
+            before.clone_from(&image.raw);
             Some((frame.timestamp - start, image))
         });
         field.accumulate(frames, bench, sigma, known, session_start);
+        field.repeated = repeated;
         field.read_infrared(view, &bench.rays);
         Ok(field)
     }
@@ -242,6 +253,7 @@ impl Field {
             reference_distance_m: None,
             flatness_m: None,
             temperature_c: None,
+            repeated: 0,
             ambient_lux: None,
             light: Vec::new(),
             infrared: None,

@@ -171,7 +171,9 @@ impl Survey {
 
     /// What each view's mean is worth as a whole, 1/px^2, and how its pixels hang together.
     pub fn weights(&self) -> Vec<(f64, Correlation)> {
-        self.views.iter().map(|v| (v.whole_weight(), v.correlation.clone())).collect()
+        // What rows take of it is found again.
+        let weight = |v: &SurveyedView| v.whole_weight() * v.row_inflation;
+        self.views.iter().map(|v| (weight(v), v.correlation.clone())).collect()
     }
 
     /// Views are worth as much as this where that is more.
