@@ -11,7 +11,6 @@ pub(super) const MAJORITY: usize = 3;
 pub(super) const NO_SHIFT: f32 = 0.07;
 /// A drift of fewer standard deviations is not worth a note.
 const NOTED_SIGMAS: f32 = 1.0;
-
 /// Standard errors by which a drift is clear of frames that jitter: of eight frames t has two degrees of freedom, and
 /// one in forty is beyond; a steady drift has 8.
 const CLEARLY: f32 = 6.0;

@@ -1,14 +1,15 @@
 //! The mean of a view's first frames, pixel by pixel, in which one bad frame counts for little.
 
 use super::Workbench;
-use crate::frame::Frame;
+use super::follow::MAJORITY;
+use crate::frame::{DepthTable, Frame};
 use crate::plane::MAD_TO_SIGMA;
-use crate::stats::{median_in_place, range};
+use crate::stats::median_in_place;
 
 /// A reading so many usual deviations from the median of its pixel shows another scene.
 const STRAY_SIGMAS: f32 = 10.0;
 /// ... if it is so many steps of the sensor from it, too.
-const STRAY_STEPS: f64 = 3.0;
+const STRAY_STEPS: f32 = 3.0;
 /// Pixels that tell the usual deviation.
 const ASKED: usize = 5000;
 
@@ -19,37 +20,82 @@ pub(super) fn mean_inverse_depth(
     bench: &Workbench<'_>,
     words_a_step: f64,
 ) -> Vec<f32> {
-    let pixels = frames[0].raw.len();
-    let mut w = Vec::with_capacity(frames.len());
-    let read = |i: usize, w: &mut Vec<f32>| {
-        w.clear();
-        w.extend(frames.iter().map(|f| 1.0 / bench.table.metres(f.raw[i])));
-        w.retain(|w| w.is_finite());
+    let seen = Seen::of(frames, &bench.table);
+    let usual = usual_scatter(frames, &bench.table);
+    let mean = |i: usize| {
+        let (n, low, high) = (usize::from(seen.count[i]), seen.low[i], seen.high[i]);
+        if n == 0 || 2 * n < frames.len() {
+            return f32::NAN;
+        }
+        let step = || bench.step(words_a_step, f64::from(low)) as f32;
+        if n >= MAJORITY && high - low > STRAY_SIGMAS * usual {
+            let far = f32::max(STRAY_SIGMAS * usual, STRAY_STEPS * step());
+            if high - low > far {
+                return without_strays(readings(frames, &bench.table, i), far);
+            }
+        }
+        seen.sum[i] / f32::from(seen.count[i])
     };
+    (0..seen.sum.len()).map(mean).collect()
+}
+
+/// Inverse depths that a pixel shows in its frames, 1/m.
+fn readings(frames: &[Frame], table: &DepthTable, pixel: usize) -> Vec<f32> {
+    let w = frames.iter().map(|f| 1.0 / table.metres(f.raw[pixel]));
+    w.filter(|w| w.is_finite()).collect()
+}
+
+/// What a reading is off the median of its pixel by, 1/m: the middle over the picture, as a standard deviation.
+fn usual_scatter(frames: &[Frame], table: &DepthTable) -> f32 {
+    let pixels = frames[0].raw.len();
     let mut off = Vec::new();
     for i in (0..pixels).step_by((pixels / ASKED).max(1)) {
-        read(i, &mut w);
+        let mut w = readings(frames, table, i);
         let median = median_in_place(&mut w);
         off.extend(w.iter().map(|w| (w - median).abs()));
     }
-    let usual = STRAY_SIGMAS * MAD_TO_SIGMA as f32 * median_in_place(&mut off);
-    let mean = |i| {
-        read(i, &mut w);
-        if w.is_empty() || 2 * w.len() < frames.len() {
-            return f32::NAN;
+    MAD_TO_SIGMA as f32 * median_in_place(&mut off)
+}
+
+/// Mean of those that are no farther from their median than `far`, or than so noisy a place scatters.
+fn without_strays(mut w: Vec<f32>, far: f32) -> f32 {
+    let median = median_in_place(&mut w.clone());
+    let mut off: Vec<f32> = w.iter().map(|w| (w - median).abs()).collect();
+    let far = far.max(STRAY_SIGMAS * MAD_TO_SIGMA as f32 * median_in_place(&mut off));
+    w.retain(|w| (w - median).abs() <= far);
+    w.iter().sum::<f32>() / w.len() as f32
+}
+
+/// Of the inverse depths of each pixel over the frames, 1/m.
+struct Seen {
+    sum: Vec<f32>,
+    count: Vec<u8>,
+    low: Vec<f32>,
+    high: Vec<f32>,
+}
+
+impl Seen {
+    fn of(frames: &[Frame], table: &DepthTable) -> Self {
+        let n = frames[0].raw.len();
+        let mut seen = Seen {
+            sum: vec![0.0; n],
+            count: vec![0; n],
+            low: vec![f32::INFINITY; n],
+            high: vec![0.0; n],
+        };
+        for frame in frames {
+            for (i, &raw) in frame.raw.iter().enumerate() {
+                let w = 1.0 / table.metres(raw);
+                if w.is_finite() {
+                    seen.sum[i] += w;
+                    seen.count[i] += 1;
+                    seen.low[i] = seen.low[i].min(w);
+                    seen.high[i] = seen.high[i].max(w);
+                }
+            }
         }
-        let [low, high] = range(w.iter().map(|&w| f64::from(w)));
-        let far = usual.max((STRAY_STEPS * bench.step(words_a_step, low)) as f32);
-        if w.len() > 2 && (high - low) as f32 > far {
-            let median = median_in_place(&mut w.clone());
-            let mut off: Vec<f32> = w.iter().map(|w| (w - median).abs()).collect();
-            // Nearer or steeper places may be noisier than most.
-            let far = far.max(STRAY_SIGMAS * MAD_TO_SIGMA as f32 * median_in_place(&mut off));
-            w.retain(|w| (w - median).abs() <= far);
-        }
-        w.iter().sum::<f32>() / w.len() as f32
-    };
-    (0..pixels).map(mean).collect()
+        seen
+    }
 }
 
 #[cfg(test)]

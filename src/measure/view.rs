@@ -8,7 +8,7 @@ use super::mean::mean_inverse_depth;
 use super::scan::{HELD_FRAMES, Scan};
 use super::{ViewMeasurement, Workbench};
 use crate::error::{Error, Result};
-use crate::frame::Frame;
+use crate::frame::{DepthTable, Frame};
 use crate::io::{FrameSource, InfraredImage};
 use crate::plane::{
     InverseDepthImage, Points, RansacOptions, RansacPlane, Target, find_target, ransac_plane,
@@ -19,7 +19,7 @@ use crate::view::{Excluded, FrameRef, Recording, View, take_out_copies};
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
-    let mut reader = FrameReader::of(view, &mut source, bench);
+    let mut reader = FrameReader::of(view, &mut source, &bench.table);
     let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
     let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
@@ -78,7 +78,7 @@ fn stray_note(view: &View, strays: &[usize]) -> Option<String> {
 pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(usize, Frame)>)> {
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
-    let mut reader = FrameReader::of(view, &mut source, bench);
+    let mut reader = FrameReader::of(view, &mut source, &bench.table);
     let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
     let target = target_of(view, bench, &held)?;
     Ok((target, numbers.into_iter().zip(held).collect()))
@@ -129,7 +129,7 @@ struct FrameReader<'r> {
     frames: std::iter::Enumerate<std::slice::Iter<'r, FrameRef>>,
     source: &'r mut FrameSource,
     notes: Vec<String>,
-    bench: &'r Workbench<'r>,
+    table: &'r DepthTable,
     before: Vec<u16>,
     repeated: usize,
 }
@@ -139,9 +139,9 @@ fn failed(view: &View, what: String, remedy: &'static str) -> Error {
 }
 
 impl<'r> FrameReader<'r> {
-    fn of(view: &'r View, source: &'r mut FrameSource, bench: &'r Workbench<'r>) -> Self {
+    fn of(view: &'r View, source: &'r mut FrameSource, table: &'r DepthTable) -> Self {
         let frames = view.depth.iter().enumerate();
-        FrameReader { frames, source, notes: Vec::new(), bench, before: Vec::new(), repeated: 0 }
+        FrameReader { frames, source, notes: Vec::new(), table, before: Vec::new(), repeated: 0 }
     }
 
     /// What was odd about the frames read.
@@ -174,7 +174,7 @@ impl Iterator for FrameReader<'_> {
         while let Some((number, frame_ref)) = self.frames.next() {
             match self.source.frame(frame_ref) {
                 Ok(f) if f.raw == self.before => self.repeated += 1,
-                Ok(f) if f.raw.iter().any(|&raw| self.bench.table.metres(raw).is_finite()) => {
+                Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
                     self.before.clone_from(&f.raw);
                     return Some((number, f));
                 }

@@ -12,6 +12,12 @@ impl Lattice {
     /// Nodes reached from `seeds` over `open` nodes.
     pub fn reached(&self, open: &[bool], seeds: &[usize]) -> Vec<bool> {
         let mut mask = vec![false; open.len()];
+        self.flood(&mut mask, open, seeds);
+        mask
+    }
+
+    /// Adds what is reached to the `mask`.
+    fn flood(&self, mask: &mut [bool], open: &[bool], seeds: &[usize]) {
         let mut queue: Vec<usize> = Vec::new();
         for &seed in seeds {
             if !mask[seed] && open[seed] {
@@ -27,19 +33,17 @@ impl Lattice {
                 }
             }
         }
-        mask
     }
 
     /// The same, and over bands without a measurement.
     pub fn reached_across_bands(&self, open: &[bool], seeds: &[usize]) -> Vec<bool> {
-        let mut from = seeds.to_vec();
+        let mut mask = self.reached(open, seeds);
         loop {
-            let mask = self.reached(open, &from);
             let beyond = self.across_bands(&mask, open);
             if beyond.is_empty() {
                 return mask;
             }
-            from.extend(beyond);
+            self.flood(&mut mask, open, &beyond);
         }
     }
 
@@ -53,8 +57,8 @@ impl Lattice {
         };
         let far_side = |node: usize, [dc, dr]: [isize; 2]| {
             let (c, r) = ((node % self.columns) as isize, (node / self.columns) as isize);
-            let line = (1..=BAND as isize + 1).map_while(|k| inside(c + k * dc, r + k * dr));
-            line.into_iter().find(|&n| self.is_measured(n)).filter(|&n| open[n] && !mask[n])
+            let mut line = (1..=BAND as isize + 1).map_while(|k| inside(c + k * dc, r + k * dr));
+            line.find(|&n| self.is_measured(n)).filter(|&n| open[n] && !mask[n])
         };
         let sides = [[1, 0], [-1, 0], [0, 1], [0, -1]];
         let set = (0..mask.len()).filter(|&node| mask[node]);
