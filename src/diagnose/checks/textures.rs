@@ -4,6 +4,7 @@
 use super::replication::agree;
 use crate::diagnose::edges::Edges;
 use crate::diagnose::edges::mixing::mean_share;
+use crate::diagnose::noise::expected_window;
 use crate::diagnose::noise::in_time::{later, of_any_two};
 use crate::diagnose::noise::mixture::Mixture;
 use crate::diagnose::noise::scatter::ScatterResult;
@@ -11,7 +12,6 @@ use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tail_counts::GAUSSIAN_TAIL;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::{ViewMean, variance_px2};
-use crate::diagnose::noise::{ROW_NOISE, expected_window};
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
@@ -77,9 +77,9 @@ fn sized(
     s: &Structure,
     variance_px2: f64,
 ) -> Option<(f64, f64)> {
-    let size = match (found.families.first().copied(), found.axis, found.statistic) {
-        (Some(ROW_NOISE), ..) => s.line_size(0, variance_px2),
-        (None, Axis::Column, Statistic::Correlation) => s.line_size(1, variance_px2),
+    let size = match (found.axis, found.statistic) {
+        (Axis::Row, Statistic::Correlation) => s.line_size(0, variance_px2),
+        (Axis::Column, Statistic::Correlation) => s.line_size(1, variance_px2),
         _ => s.pixels,
     };
     Some((beyond(s).filter(|x| x.is_finite())?, size))

@@ -146,7 +146,7 @@ mod tests {
 
     /// Of twelve views nine have it, and of the others fewer than three lie below in most sessions.
     #[test]
-    fn most_of_the_views_are_told_by_their_own_error() {
+    fn nine_of_twelve_views_are_told_by_their_own_error() {
         let mut rng = Seed(5).stream("some-views/most");
         let mut off = |tall| -> Vec<f64> {
             views(12, tall, 15.0, &mut rng).into_iter().map(|x| 100.0 * x).collect()

@@ -87,7 +87,7 @@ pub fn coarsest_step(places: &[Place], [coarsest, finest]: [f64; 2]) -> Option<(
     let range = places.last()?.at - places.first()?.at;
     let by = PHASE_STEP / range.abs().max(finest);
     let frequency = |scanned: usize| 1.0 / coarsest + scanned as f64 * by;
-    let scan = (0..).map(|n| (n, 1.0 / frequency(n))).take_while(|(_, size)| *size > finest);
+    let mut scan = (0..).map(|n| (n, 1.0 / frequency(n))).take_while(|(_, size)| *size > finest);
     let told = |(scanned, size): (usize, f64)| {
         // Wider words cannot show it.
         let fine: Vec<Place> = places.iter().filter(|p| p.width < COARSE * size).copied().collect();
@@ -100,7 +100,7 @@ pub fn coarsest_step(places: &[Place], [coarsest, finest]: [f64; 2]) -> Option<(
         let near = (lattice.size / size - 1.0).abs() < 0.5;
         (near && p < CHANCE).then(|| (lattice.size, p.max(f64::MIN_POSITIVE)))
     };
-    scan.filter_map(told).next()
+    scan.find_map(told)
 }
 
 #[cfg(test)]

@@ -98,10 +98,14 @@ impl RawHistogram {
 
     fn of_depths(&self, units_per_metre: f64, scale_px_m: f64) -> Quantisation {
         let words = self.occurring();
-        let of_depth = |size, p| Step { size: size / units_per_metre, p: Some(p) };
-        let of_depth = |(size, p)| Quantisation { depth: Some(of_depth(size, p)), disparity: None };
-        let of_disparity =
-            |(size, p)| Quantisation { depth: None, disparity: Some(Step { size, p: Some(p) }) };
+        let of_depth = |(units, p)| {
+            let depth = Some(Step { size: units / units_per_metre, p: Some(p) });
+            Quantisation { depth, disparity: None }
+        };
+        let of_disparity = |(size, p)| {
+            let disparity = Some(Step { size, p: Some(p) });
+            Quantisation { depth: None, disparity }
+        };
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         let by_chance = all_multiples(stride, words.len());
         let few = words.len() < MIN_WORDS;
@@ -120,31 +124,30 @@ impl RawHistogram {
         } else {
             (steps_of_disparities(&words, px_words), steps_of_depths(&words))
         };
-        let place = |at, width, n: f64| Place { at, width, weight: n.sqrt() };
-        // A comb tells a step or a fraction of it.
-        let coarser = |step: Option<f64>, finest| step.map_or(finest, |s: f64| COARSER * s);
-        let coarse_px = {
-            let of_word = |&(w, n): &(usize, f64)| {
-                let w = w as f64;
-                place(px_words / w, px_words / (w * w), n)
+        let places = |of: &dyn Fn(f64) -> [f64; 2]| -> Vec<Place> {
+            let place = |&(word, n): &(usize, f64)| {
+                let [at, width] = of(word as f64);
+                Place { at, width, weight: n.sqrt() }
             };
-            let places: Vec<Place> = words.iter().map(of_word).collect();
-            coarsest_step(&places, [COARSEST_PX, coarser(disparity.step(), STEPS_PX[0])])
+            words.iter().map(place).collect()
         };
-        let coarse_units = few.then(|| {
-            let places: Vec<Place> = words.iter().map(|&(w, n)| place(w as f64, 1.0, n)).collect();
-            let [finest, coarsest] = STEPS_UNITS;
-            coarsest_step(&places, [coarsest, finest])
-        });
-        match (coarse_px, coarse_units.flatten()) {
+        // A comb tells a step or a fraction of it.
+        let finest_px = disparity.step().map_or(STEPS_PX[0], |step| COARSER * step);
+        let in_px = places(&|w| [px_words / w, px_words / (w * w)]);
+        let coarse_px = coarsest_step(&in_px, [COARSEST_PX, finest_px]);
+        let [finest, coarsest] = STEPS_UNITS;
+        let coarse_units = || coarsest_step(&places(&|w| [w, 1.0]), [coarsest, finest]);
+        match (coarse_px, few.then(coarse_units).flatten()) {
             (Some(px), Some(units)) if units.1 < px.1 => of_depth(units),
             (Some(px), _) => of_disparity(px),
             (None, Some(units)) => of_depth(units),
-            (None, None) if depth.resultant > disparity.resultant => {
-                depth.step().map(|size| of_depth((size, depth.p))).unwrap_or_default()
-            }
             (None, None) => {
-                disparity.step().map(|size| of_disparity((size, disparity.p))).unwrap_or_default()
+                let told = if depth.resultant > disparity.resultant {
+                    depth.step().map(|units| of_depth((units, depth.p)))
+                } else {
+                    disparity.step().map(|size| of_disparity((size, disparity.p)))
+                };
+                told.unwrap_or_default()
             }
         }
     }
