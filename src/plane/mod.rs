@@ -7,6 +7,7 @@
 //! steepens small, far, tilted targets (0.3 to 1 degree on the real views beyond 2.4 m).
 
 mod affine;
+mod bands;
 mod border;
 mod candidate;
 mod curved;

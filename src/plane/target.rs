@@ -2,6 +2,7 @@
 //! looks at.
 
 use super::affine::AffineFit;
+use super::bands::without_bands;
 use super::border::beside;
 use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
 use super::curved::curved_target;
@@ -20,6 +21,8 @@ pub fn find_target(
     region: Option<&Region>,
     rng: &mut Stream,
 ) -> Result<Target, String> {
+    let without_bands = without_bands(image);
+    let image = &InverseDepthImage { w: without_bands.as_deref().unwrap_or(image.w), ..*image };
     match region {
         Some(region) => in_region(image, region, rng),
         None => at_principal_point(image, rng),

@@ -1,0 +1,158 @@
+//! Bands of columns that firmware shifts by a step: no edge of the target.
+
+use super::image::InverseDepthImage;
+use crate::stats::{even, median_in_place, range};
+
+/// Columns on either side of a step whose means are compared, twice: at a step, and for the slope.
+const WINDOW: usize = 4;
+/// Rows that are looked at, evenly over the image: the median of 120 is known to an eighth of sigma.
+const ROWS: usize = 120;
+/// A column is judged by this many rows at least.
+const MIN_ROWS: usize = 30;
+/// Share of the rows on either side of which the step must have the same sign: what stands in the
+/// scene ends somewhere, a band of the firmware goes through all of the picture.
+const TAIL: f64 = 0.1;
+/// The steps of a picture are one step of the firmware, measured to this factor; larger ones are the
+/// upright edges of a board that is higher than the picture.
+const MAX_UNEQUAL: f64 = 2.0;
+/// ... and more than so many steps of the depth code: a tilted plane has contours of one.
+const MIN_CODE_STEPS: f64 = 1.5;
+
+/// The image without its bands; `None` where it has none.
+///
+/// Steps of a saw-tooth all go one way and are equal. They are taken out with the slope between them, so that
+/// the mean plane stays.
+pub(super) fn without_bands(image: &InverseDepthImage<'_>) -> Option<Vec<f32>> {
+    let (width, mut steps) = (image.camera.width, steps(image));
+    let contour = MIN_CODE_STEPS * (image.step)(median_inverse_depth(image));
+    steps.retain(|(_, step)| f64::from(step.abs()) > contour);
+    let [low, _] = range(steps.iter().map(|(_, step)| step.abs().into()));
+    steps.retain(|(_, step)| f64::from(step.abs()) <= MAX_UNEQUAL * low);
+    let one_way = steps.iter().all(|(_, s)| *s > 0.0) || steps.iter().all(|(_, s)| *s < 0.0);
+    if steps.len() < 2 || !one_way {
+        return None;
+    }
+    let stairs: Vec<f64> = (0..width)
+        .map(|u| steps.iter().filter(|(at, _)| *at <= u).map(|(_, s)| f64::from(*s)).sum())
+        .collect();
+    let teeth = less_line(&stairs);
+    Some(image.w.iter().enumerate().map(|(i, w)| w - teeth[i % width]).collect())
+}
+
+fn median_inverse_depth(image: &InverseDepthImage<'_>) -> f64 {
+    let stride = (image.w.len() / 3000).max(1);
+    let mut some: Vec<f32> =
+        image.w.iter().step_by(stride).copied().filter(|w| w.is_finite()).collect();
+    median_in_place(&mut some).into()
+}
+
+/// First columns after a step, and its height, 1/m.
+fn steps(image: &InverseDepthImage<'_>) -> Vec<(usize, f32)> {
+    let (width, height) = (image.camera.width, image.camera.height);
+    if width < 4 * WINDOW {
+        return Vec::new();
+    }
+    let rows = even([0.0, (height - 1) as f64], ROWS.min(height)).map(|row| row as usize);
+    let heights: Vec<Vec<f32>> =
+        rows.map(|row| heights(&image.w[row * width..(row + 1) * width])).collect();
+    let step_at = |u: usize| {
+        let mut there: Vec<f32> =
+            heights.iter().map(|row| row[u]).filter(|h| h.is_finite()).collect();
+        let tail = (TAIL * there.len() as f64) as usize;
+        if there.len() < MIN_ROWS {
+            return 0.0;
+        }
+        let median = median_in_place(&mut there);
+        let other_way = there.iter().filter(|h| **h * median <= 0.0).count();
+        if other_way > tail { 0.0 } else { median }
+    };
+    let all: Vec<f32> = (0..width).map(step_at).collect();
+    // Beside a step the windows' slopes make two of half its height.
+    let highest = |u: usize| {
+        let around = u.saturating_sub(2 * WINDOW)..=(u + 2 * WINDOW).min(width - 1);
+        all[u] != 0.0 && around.into_iter().all(|other| all[other].abs() <= all[u].abs())
+    };
+    (0..width).filter(|u| highest(*u)).map(|u| (u, all[u])).collect()
+}
+
+/// How far a row steps up before each column, beyond its slope on either side; NaN where a pixel lacks.
+fn heights(row: &[f32]) -> Vec<f32> {
+    let mean = |from: usize| row[from..from + WINDOW].iter().sum::<f32>() / WINDOW as f32;
+    let height = |u: usize| {
+        if u < 2 * WINDOW || u + 2 * WINDOW > row.len() {
+            return f32::NAN;
+        }
+        let [far_left, left] = [mean(u - 2 * WINDOW), mean(u - WINDOW)];
+        let [right, far_right] = [mean(u), mean(u + WINDOW)];
+        (right - left) - 0.5 * ((far_right - right) + (left - far_left))
+    };
+    (0..row.len()).map(height).collect()
+}
+
+/// Less the line that fits the values best.
+fn less_line(values: &[f64]) -> Vec<f32> {
+    let n = values.len() as f64;
+    let (middle, mean) = (0.5 * (n - 1.0), values.iter().sum::<f64>() / n);
+    let along = |i: usize| i as f64 - middle;
+    let slope = values.iter().enumerate().map(|(i, v)| along(i) * v).sum::<f64>()
+        / (0..values.len()).map(|i| along(i).powi(2)).sum::<f64>();
+    values.iter().enumerate().map(|(i, v)| (v - mean - slope * along(i)) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::camera::Camera;
+    use crate::rng::Seed;
+
+    const NOISE: f64 = 0.001;
+
+    /// A wall of slope `slope` (1/m a column) with noise and something more.
+    fn wall(slope: f64, more: impl Fn(usize, usize) -> f64) -> (Camera, Vec<f32>) {
+        let camera = Camera::centred(320, 240, 290.0);
+        let mut rng = Seed(7).stream("bands");
+        let at = |i: usize| {
+            let (u, v) = (i % 320, i / 320);
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            (0.5 + slope * u as f64 + NOISE * noise + more(u, v)) as f32
+        };
+        (camera, (0..320 * 240).map(at).collect())
+    }
+
+    fn found((camera, w): &(Camera, Vec<f32>)) -> Option<Vec<f32>> {
+        let rays = camera.rays();
+        without_bands(&InverseDepthImage { w, rays: &rays, camera, step: &|_| 0.0 })
+    }
+
+    /// Of a saw-tooth of either direction, on a tilted wall, less than a sigma is left.
+    #[test]
+    fn a_saw_tooth_goes_and_the_plane_stays() {
+        for (slope, tooth) in [(0.0, 0.01), (5e-4, 0.01), (-5e-4, -0.03)] {
+            let saw = |u: usize, _: usize| tooth * ((u + 13) as f64 / 53.0).fract();
+            let found = found(&wall(slope, saw)).expect("bands");
+            for (u, v) in [(40, 20), (160, 120), (300, 200)] {
+                let mean: f32 = (u - 12..u + 12)
+                    .flat_map(|u| (v - 12..v + 12).map(move |v| v * 320 + u))
+                    .map(|i| found[i])
+                    .sum::<f32>()
+                    / 576.0;
+                let plane = 0.5 + 0.5 * tooth + slope * (u as f64 - 0.5);
+                assert!((f64::from(mean) - plane).abs() < NOISE, "{slope} {tooth} at {u}: {mean}");
+            }
+        }
+    }
+
+    /// Nor are the edges of a board, of a shelf's boards, or of two doors bands of the firmware.
+    #[test]
+    fn what_stands_in_the_scene_is_no_band() {
+        assert!(found(&wall(2e-4, |_, _| 0.0)).is_none());
+        let board = |u: usize, _: usize| if (100..220).contains(&u) { 0.3 } else { 0.0 };
+        assert!(found(&wall(0.0, board)).is_none());
+        let shelf = |u: usize, v: usize| if v > 60 { 0.02 * (u / 80) as f64 } else { 0.0 };
+        assert!(found(&wall(0.0, shelf)).is_none());
+        let door = |u: usize, _: usize| if u > 200 { 0.02 } else { 0.0 };
+        assert!(found(&wall(0.0, door)).is_none());
+    }
+}
