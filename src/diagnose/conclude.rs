@@ -20,7 +20,7 @@ use super::joint::anchor::{anchor, let_planes_be};
 use super::missing::shapes::Step;
 use super::search::outcome::Outcome;
 use super::verdict::{
-    extend, few_frames, not_identifiable, repeated_frames, shares, untested, verdict,
+    extend, few_frames, frames_left_out, not_identifiable, shares, untested, verdict,
 };
 use super::views::between::between;
 use super::views::field::Field;
@@ -82,7 +82,7 @@ impl Case<'_> {
         remarks.append(&mut self.remarks());
         remarks.extend(untested(outcomes, self.survey.block_tiles));
         remarks.extend(few_frames(&self.fields));
-        remarks.extend(repeated_frames(&self.fields));
+        remarks.extend(frames_left_out(&self.fields));
         remarks.extend(better_form);
         let told = found.iter().chain(&refitted);
         let mut extended = extend(self.model, told, self.sensor(), self.survey.reach.disparity);

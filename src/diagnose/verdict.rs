@@ -137,13 +137,19 @@ pub(super) fn few_frames(fields: &[Field]) -> Option<String> {
     })
 }
 
-/// Frames that a view has twice.
-pub(super) fn repeated_frames(fields: &[Field]) -> Option<String> {
-    let repeated: usize = fields.iter().map(|f| f.repeated).sum();
-    let all: usize = fields.iter().map(|f| f.repeated + f.frames.len()).sum();
-    (repeated > 0).then(|| {
-        format!("{repeated} of {all} frames were left out: they are word for word the frame before")
-    })
+/// Frames that were left out, and why.
+pub(super) fn frames_left_out(fields: &[Field]) -> Vec<String> {
+    let sum = |of: &dyn Fn(&Field) -> usize| fields.iter().map(of).sum::<usize>();
+    let all = sum(&|f| f.repeated + f.stale + f.frames.len());
+    let told =
+        |n: usize, why: &str| (n > 0).then(|| format!("{n} of {all} frames were left out: {why}"));
+    let repeated = told(sum(&|f| f.repeated), "they are word for word the frame before");
+    let stale = told(
+        sum(&|f| f.stale),
+        "most of the target is not where the first frames of their view show it; they are stale or damaged, \
+         or something was moved",
+    );
+    repeated.into_iter().chain(stale).collect()
 }
 
 /// The model with what was found.

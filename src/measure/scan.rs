@@ -106,7 +106,7 @@ impl<'a> Scan<'a> {
 
     /// By how much each cell's residuals lie off, as a whole, in this frame; `None` where more than half of what
     /// it measured is too far off.
-    fn shifts(&mut self, frame: &Frame) -> Option<Vec<f32>> {
+    pub(super) fn shifts(&mut self, frame: &Frame) -> Option<Vec<f32>> {
         let (mut kept, mut measured) = (0, 0);
         let mut offsets = Vec::with_capacity(self.cut.len());
         for (cell, &cut) in self.cut.iter().enumerate() {

@@ -3,24 +3,19 @@
 use rayon::prelude::*;
 
 use super::budget::distance_budget;
-use super::grouping::words_a_step;
-use super::mean::mean_inverse_depth;
-use super::scan::{HELD_FRAMES, Scan};
+use super::frames::{FrameReader, failed, target_of, view_target};
+use super::scan::Scan;
 use super::{ViewMeasurement, Workbench};
-use crate::error::{Error, Result};
-use crate::frame::{DepthTable, Frame};
-use crate::io::{FrameSource, InfraredImage};
-use crate::plane::{
-    InverseDepthImage, Points, RansacOptions, RansacPlane, Target, find_target, ransac_plane,
-};
-use crate::view::{Excluded, FrameRef, Recording, View, take_out_copies};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::io::InfraredImage;
+use crate::plane::{Points, RansacOptions, RansacPlane, Target, ransac_plane};
+use crate::view::{Excluded, Recording, View, take_out_copies};
 
 /// An error when no frame can be read or none shows a plane; others that cannot are notes.
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
-    let camera = &bench.sensor.camera;
-    let mut source = FrameSource::new(camera.width, camera.height);
-    let mut reader = FrameReader::of(view, &mut source, &bench.table);
-    let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
+    let mut reader = FrameReader::of(view, bench);
+    let (numbers, held) = reader.hold(view)?;
     let target = target_of(view, bench, &held)?;
     let mut scan = Scan::begin(bench, &target, &held);
     let mut strays: Vec<usize> = Vec::new();
@@ -37,7 +32,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
     for (number, frame) in reader.by_ref() {
         add(number, &frame);
     }
-    let mut notes = reader.into_notes(view);
+    let (mut notes, digest) = reader.finish(view);
     notes.extend(stray_note(view, &strays));
     let nothing = || {
         let what = "the residuals of its plane cannot be measured".into();
@@ -57,7 +52,7 @@ pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasuremen
         reference_distance_m: view.notes.reference_distance_m,
         reference_uncertainty_m: view.notes.reference_uncertainty_m,
         notes,
-        digest: source.digest(),
+        digest,
         ..measured
     };
     measured.distance_budget = distance_budget(&measured, &view.notes, bench.sensor);
@@ -72,16 +67,6 @@ fn stray_note(view: &View, strays: &[usize]) -> Option<String> {
         strays.len(),
         view.depth.len()
     ))
-}
-
-/// The target of one view, from its first frames; and these, by their numbers in the view.
-pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<(Target, Vec<(usize, Frame)>)> {
-    let camera = &bench.sensor.camera;
-    let mut source = FrameSource::new(camera.width, camera.height);
-    let mut reader = FrameReader::of(view, &mut source, &bench.table);
-    let (numbers, held): (Vec<usize>, Vec<Frame>) = reader.hold(view)?.into_iter().unzip();
-    let target = target_of(view, bench, &held)?;
-    Ok((target, numbers.into_iter().zip(held).collect()))
 }
 
 /// So many views are no chance: one in 32 where either reading alike finds a plane that the other does not.
@@ -122,94 +107,6 @@ pub fn without_copies(recording: &Recording, views: &mut Vec<ViewMeasurement>) -
         Excluded { view: copy.name, reason }
     };
     copies.into_iter().map(told).collect()
-}
-
-/// Hands out the frames that can be read and do not repeat the one before; the others are told in the notes.
-struct FrameReader<'r> {
-    frames: std::iter::Enumerate<std::slice::Iter<'r, FrameRef>>,
-    source: &'r mut FrameSource,
-    notes: Vec<String>,
-    table: &'r DepthTable,
-    before: Vec<u16>,
-    repeated: usize,
-}
-
-fn failed(view: &View, what: String, remedy: &'static str) -> Error {
-    Error::View { view: view.name.clone(), what, remedy }
-}
-
-impl<'r> FrameReader<'r> {
-    fn of(view: &'r View, source: &'r mut FrameSource, table: &'r DepthTable) -> Self {
-        let frames = view.depth.iter().enumerate();
-        FrameReader { frames, source, notes: Vec::new(), table, before: Vec::new(), repeated: 0 }
-    }
-
-    /// What was odd about the frames read.
-    fn into_notes(self, view: &View) -> Vec<String> {
-        let (repeated, total) = (self.repeated, view.depth.len());
-        let told = (repeated > 0).then(|| {
-            format!(
-                "{repeated} of {total} frames left out: word for word the frame before; counted as \
-                 measurements of their own they would make temporal sigma wrong"
-            )
-        });
-        self.notes.into_iter().chain(told).collect()
-    }
-
-    fn hold(&mut self, view: &View) -> Result<Vec<(usize, Frame)>> {
-        let held: Vec<(usize, Frame)> = self.by_ref().take(HELD_FRAMES).collect();
-        if held.is_empty() {
-            let why = self.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
-            return Err(failed(view, why, "record the view again"));
-        }
-        Ok(held)
-    }
-}
-
-impl Iterator for FrameReader<'_> {
-    /// With its number in the view.
-    type Item = (usize, Frame);
-
-    fn next(&mut self) -> Option<(usize, Frame)> {
-        while let Some((number, frame_ref)) = self.frames.next() {
-            match self.source.frame(frame_ref) {
-                Ok(f) if f.raw == self.before => self.repeated += 1,
-                Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
-                    self.before.clone_from(&f.raw);
-                    return Some((number, f));
-                }
-                Ok(_) => self.notes.push(format!(
-                    "frame left out: {}: no pixel carries a depth",
-                    frame_ref.place()
-                )),
-                Err(e) => self.notes.push(format!("frame left out: {e}")),
-            }
-        }
-        None
-    }
-}
-
-fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
-    let words = held.iter().flat_map(|frame| frame.raw.iter().copied());
-    let words_a_step = words_a_step(words, &bench.table);
-    let mut w = mean_inverse_depth(held, bench, words_a_step);
-    if bench.ray_share != 0.0 {
-        for (i, w) in w.iter_mut().enumerate() {
-            let (x, y) = bench.rays.at(i);
-            let foreshortening = (1.0 + x * x + y * y).sqrt().recip();
-            *w /= (1.0 - bench.ray_share * (1.0 - foreshortening)) as f32;
-        }
-    }
-    let image = InverseDepthImage {
-        w: &w,
-        rays: &bench.rays,
-        camera: &bench.sensor.camera,
-        step: &|w| bench.step(words_a_step, w),
-    };
-    let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
-    let remedy = "give the target's region in view.json (roi or polygon), or record the view again";
-    find_target(&image, view.notes.region.as_ref(), &mut rng)
-        .map_err(|what| failed(view, what, remedy))
 }
 
 /// Mean amplitude over the target in the view's first readable infrared image.

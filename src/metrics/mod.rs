@@ -94,7 +94,7 @@ fn named(excluded: &Excluded) -> [String; 2] {
 }
 
 fn of_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMetrics> {
-    let (target, _) = view_target(view, bench)?;
+    let target = view_target(view, bench)?;
     let ViewMeasurement { whole, .. } = measure_view(view, bench)?;
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);

@@ -175,7 +175,7 @@ pub fn plan_like(
     let options = MeasureOptions { seed, ..MeasureOptions::default() };
     let bench = Workbench::new(&recording.sensor, options);
     let (found, excluded) = recording.each_view(&|_, _| (), |view| {
-        let (target, _) = view_target(view, &bench)?;
+        let target = view_target(view, &bench)?;
         Ok((view, target))
     });
     let plan = |(view, Found { plane, pixels, .. }): (&View, Found)| {

@@ -8,7 +8,7 @@ use kinoise::diagnose::{DiagnoseOptions, Finding, diagnose};
 use kinoise::effects::Active;
 use kinoise::scene::Target;
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
-use kinoise::view::{Recording, RecordingFile};
+use kinoise::view::{FrameRef, Recording, RecordingFile};
 use kinoise::{
     CalibrateOptions, DepthCode, Form, Frame, NoiseModel, Seed, Sensor, SigmaModel, io,
     measure_recording, model_of,
@@ -315,4 +315,28 @@ fn a_frame_stored_twice_is_one_frame() {
         2 * frames
     );
     assert!(remarks.contains(&told), "{remarks:?}");
+}
+
+/// A frame of the view before, as drivers hand out when a recording begins, is not noise over time.
+#[test]
+fn a_stale_frame_is_left_out_of_the_diagnosis_and_told() {
+    let recording = io::open(good(), &io::Assumed::default()).expect("a recording");
+    let mut stale = recording.clone();
+    for view in [3, 7] {
+        let frames = &mut stale.views[view].depth;
+        frames[0] = FrameRef {
+            timestamp: frames[0].timestamp,
+            ..recording.views[view - 1].depth[0].clone()
+        };
+    }
+    let judged = |recording: &Recording| {
+        let (model, options) = (NoiseModel::paper(), DiagnoseOptions::default());
+        let told = diagnose(recording, &model, &options, &|_, _| ()).expect("diagnosed").diagnosis;
+        let names: Vec<_> = told.findings.iter().map(|f| (f.status, f.effect, f.axis)).collect();
+        (told.verdict, names, told.remarks)
+    };
+    let [(right, names, _), (verdict, same, remarks)] = [&recording, &stale].map(judged);
+    assert_eq!((verdict, same), (right, names));
+    let told = remarks.iter().find(|r| r.contains("not where the first frames")).expect("a remark");
+    assert!(told.starts_with("2 of "), "{told}");
 }

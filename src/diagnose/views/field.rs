@@ -12,8 +12,7 @@ use crate::diagnose::steps::lattice::RawHistogram;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::io::read_depth;
-use crate::measure::{ColumnSteps, Workbench, view_target};
+use crate::measure::{ColumnSteps, TargetFrames, Workbench};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::stats::median_in_place;
@@ -55,6 +54,8 @@ pub struct Field {
     pub frames: Vec<(f64, f64)>,
     /// Frames that are word for word the one before, and were left out.
     pub repeated: usize,
+    /// Frames that show the target elsewhere than the first ones do, and were left out.
+    pub stale: usize,
     /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
     pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
@@ -94,30 +95,16 @@ impl Field {
         known: &KnownTerms,
         session_start: f64,
     ) -> Result<Self> {
-        let (target, held) = view_target(view, bench)?;
-        let camera = &bench.sensor.camera;
-        let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
+        let mut frames = TargetFrames::of(view, bench)?;
+        let target = &mut frames.target;
+        let pixels = std::mem::take(&mut target.pixels);
+        let mut field = Field::empty(view, bench.sensor, target.plane, pixels);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
-        // Frames that repeat the one before were left out there; if all do, nothing in the view moves.
-        let repeats = held.len() > 1;
-        let (mut before, mut repeated) = (Vec::new(), 0);
-        let mut held = held.into_iter().peekable();
-        // Frames that showed the target are not read twice.
-        let frames = view.depth.iter().enumerate().filter_map(|(number, frame)| {
-            let image = match held.next_if(|h| h.0 == number) {
-                Some((_, image)) => image,
-                None => read_depth(frame, camera.width, camera.height).ok()?,
-            };
-            if repeats && image.raw == before {
-                repeated += 1;
-                return None;
-            }
-            before.clone_from(&image.raw);
-            Some((frame.timestamp - start, image))
-        });
-        field.accumulate(frames, bench, sigma, known, session_start);
-        field.repeated = repeated;
+        let timed = frames.by_ref().map(|(k, frame)| (view.depth[k].timestamp - start, frame));
+        field.accumulate(timed, bench, sigma, known, session_start);
+        field.repeated = frames.repeated();
+        field.stale = frames.stale;
         field.read_infrared(view, &bench.rays);
         Ok(field)
     }
@@ -254,6 +241,7 @@ impl Field {
             flatness_m: None,
             temperature_c: None,
             repeated: 0,
+            stale: 0,
             ambient_lux: None,
             light: Vec::new(),
             infrared: None,

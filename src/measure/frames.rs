@@ -1,0 +1,169 @@
+//! A view's target, and its frames one after the other: those that can be read and tell something new.
+
+use super::Workbench;
+use super::grouping::words_a_step;
+use super::mean::mean_inverse_depth;
+use super::scan::{HELD_FRAMES, Scan};
+use crate::error::{Error, Result};
+use crate::frame::{DepthTable, Frame};
+use crate::io::FrameSource;
+use crate::plane::{InverseDepthImage, Target, find_target};
+use crate::view::{FrameRef, View};
+
+/// Hands out the frames that can be read and do not repeat the one before; the others are told in the notes.
+pub(super) struct FrameReader<'v> {
+    frames: std::iter::Enumerate<std::slice::Iter<'v, FrameRef>>,
+    source: FrameSource,
+    notes: Vec<String>,
+    table: &'v DepthTable,
+    before: Vec<u16>,
+    repeated: usize,
+}
+
+impl<'v> FrameReader<'v> {
+    pub fn of(view: &'v View, bench: &'v Workbench<'_>) -> Self {
+        let camera = &bench.sensor.camera;
+        FrameReader {
+            frames: view.depth.iter().enumerate(),
+            source: FrameSource::new(camera.width, camera.height),
+            notes: Vec::new(),
+            table: &bench.table,
+            before: Vec::new(),
+            repeated: 0,
+        }
+    }
+
+    /// What was odd about the frames read, and the hash of their bytes.
+    pub fn finish(self, view: &View) -> (Vec<String>, [u8; 32]) {
+        let (repeated, total) = (self.repeated, view.depth.len());
+        let told = (repeated > 0).then(|| {
+            format!(
+                "{repeated} of {total} frames left out: word for word the frame before; counted as \
+                 measurements of their own they would make temporal sigma wrong"
+            )
+        });
+        (self.notes.into_iter().chain(told).collect(), self.source.digest())
+    }
+
+    /// The first frames, and their numbers in the view.
+    pub fn hold(&mut self, view: &View) -> Result<(Vec<usize>, Vec<Frame>)> {
+        let (numbers, held): (Vec<usize>, Vec<Frame>) = self.by_ref().take(HELD_FRAMES).unzip();
+        if held.is_empty() {
+            let why = self.notes.first().cloned().unwrap_or_else(|| "it has no frame".into());
+            return Err(failed(view, why, "record the view again"));
+        }
+        Ok((numbers, held))
+    }
+}
+
+impl Iterator for FrameReader<'_> {
+    /// With its number in the view.
+    type Item = (usize, Frame);
+
+    fn next(&mut self) -> Option<(usize, Frame)> {
+        while let Some((number, frame_ref)) = self.frames.next() {
+            match self.source.frame(frame_ref) {
+                Ok(f) if f.raw == self.before => self.repeated += 1,
+                Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
+                    self.before.clone_from(&f.raw);
+                    return Some((number, f));
+                }
+                Ok(_) => self.notes.push(format!(
+                    "frame left out: {}: no pixel carries a depth",
+                    frame_ref.place()
+                )),
+                Err(e) => self.notes.push(format!("frame left out: {e}")),
+            }
+        }
+        None
+    }
+}
+
+/// The target of one view, from its first frames.
+pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<Target> {
+    let (_, held) = FrameReader::of(view, bench).hold(view)?;
+    target_of(view, bench, &held)
+}
+
+pub(super) fn target_of(view: &View, bench: &Workbench<'_>, held: &[Frame]) -> Result<Target> {
+    let words = held.iter().flat_map(|frame| frame.raw.iter().copied());
+    let words_a_step = words_a_step(words, &bench.table);
+    let mut w = mean_inverse_depth(held, bench, words_a_step);
+    if bench.ray_share != 0.0 {
+        for (i, w) in w.iter_mut().enumerate() {
+            let (x, y) = bench.rays.at(i);
+            let foreshortening = (1.0 + x * x + y * y).sqrt().recip();
+            *w /= (1.0 - bench.ray_share * (1.0 - foreshortening)) as f32;
+        }
+    }
+    let image = InverseDepthImage {
+        w: &w,
+        rays: &bench.rays,
+        camera: &bench.sensor.camera,
+        step: &|w| bench.step(words_a_step, w),
+    };
+    let mut rng = bench.options.seed.stream(&format!("target/{}", view.name));
+    let remedy = "give the target's region in view.json (roi or polygon), or record the view again";
+    find_target(&image, view.notes.region.as_ref(), &mut rng)
+        .map_err(|what| failed(view, what, remedy))
+}
+
+pub(super) fn failed(view: &View, what: String, remedy: &'static str) -> Error {
+    Error::View { view: view.name.clone(), what, remedy }
+}
+
+/// The frames that show a view's target, with their numbers in the view.
+///
+/// Frames that repeat the one before are left out, unless all of the view are alike; so are a few in which most of
+/// the target is not where the first frames show it.
+pub struct TargetFrames<'v> {
+    pub target: Target,
+    /// How many of the frames up to here show it elsewhere.
+    pub stale: usize,
+    first: Box<dyn Iterator<Item = (usize, Frame)> + 'v>,
+    reader: FrameReader<'v>,
+    /// Where the first frames show the target; `None` where that leaves no frame out.
+    scan: Option<Scan<'v>>,
+}
+
+/// Where a larger share of the first frames shows the target elsewhere they are not stale: something moves.
+const MAX_STALE: f64 = 0.25;
+
+impl<'v> TargetFrames<'v> {
+    /// An error when no frame can be read or none shows a plane.
+    pub fn of(view: &'v View, bench: &'v Workbench<'_>) -> Result<Self> {
+        let mut reader = FrameReader::of(view, bench);
+        let (numbers, mut held) = reader.hold(view)?;
+        let target = target_of(view, bench, &held)?;
+        let mut scan = Scan::begin(bench, &target, &held);
+        let stale = held.iter().filter(|frame| scan.shifts(frame).is_none()).count();
+        let moves = stale as f64 > MAX_STALE * held.len() as f64;
+        let first: Box<dyn Iterator<Item = _>> = if held.len() == 1 && reader.repeated > 0 {
+            let frames = reader.repeated + 1;
+            reader.repeated = 0;
+            Box::new(std::iter::repeat_n(held.swap_remove(0), frames).enumerate())
+        } else {
+            Box::new(numbers.into_iter().zip(held))
+        };
+        Ok(TargetFrames { target, stale: 0, first, reader, scan: (!moves).then_some(scan) })
+    }
+
+    /// How many of the frames up to here repeat the one before.
+    pub fn repeated(&self) -> usize {
+        self.reader.repeated
+    }
+}
+
+impl Iterator for TargetFrames<'_> {
+    type Item = (usize, Frame);
+
+    fn next(&mut self) -> Option<(usize, Frame)> {
+        loop {
+            let (number, frame) = self.first.next().or_else(|| self.reader.next())?;
+            if self.scan.as_mut().is_none_or(|scan| scan.shifts(&frame).is_some()) {
+                return Some((number, frame));
+            }
+            self.stale += 1;
+        }
+    }
+}
