@@ -1,7 +1,13 @@
-//! Bands of columns that firmware shifts by a step: no edge of the target.
+//! The target across bands of columns that firmware shifts by a step: no edge of the target.
+//!
+//! Of any height and at any columns; those of a Kinect, of one step of its depth code, stop no search and are known
+//! better (`measure::ColumnSteps`).
 
-use super::image::InverseDepthImage;
+use super::image::{InverseDepthImage, Target};
+use super::target::target_in;
+use crate::rng::Stream;
 use crate::stats::{even, median_in_place, range};
+use crate::view::Region;
 
 /// Columns on either side of a step whose means are compared, twice: at a step, and for the slope.
 const WINDOW: usize = 4;
@@ -18,11 +24,32 @@ const MAX_UNEQUAL: f64 = 2.0;
 /// ... and more than so many steps of the depth code: a tilted plane has contours of one.
 const MIN_CODE_STEPS: f64 = 1.5;
 
+/// The plane in `region`, or else the one the principal point looks at; or why there is none.
+pub fn find_target(
+    image: &InverseDepthImage<'_>,
+    region: Option<&Region>,
+    rng: &mut Stream,
+) -> Result<Target, String> {
+    let target = target_in(image, region, rng);
+    let Some(w) = without_bands(image) else { return target };
+    let size = |target: &Target| target.pixels.len() as f64;
+    let whole = target_in(&InverseDepthImage { w: &w, ..*image }, region, rng);
+    match (&target, &whole) {
+        (Ok(found), Ok(whole)) if size(whole) < CUT_BY_BANDS * size(found) => target,
+        (Ok(_), Err(_)) => target,
+        _ => whole,
+    }
+}
+
+/// Where bands of the firmware cut the target off it is larger without them by more than this: they are narrower
+/// than a third of the picture. What else steps at one column, such as contours of a steep plane, cuts nothing off.
+const CUT_BY_BANDS: f64 = 1.2;
+
 /// The image without its bands; `None` where it has none.
 ///
 /// Steps of a saw-tooth all go one way and are equal. They are taken out with the slope between them, so that
 /// the mean plane stays.
-pub(super) fn without_bands(image: &InverseDepthImage<'_>) -> Option<Vec<f32>> {
+fn without_bands(image: &InverseDepthImage<'_>) -> Option<Vec<f32>> {
     let (width, mut steps) = (image.camera.width, steps(image));
     let contour = MIN_CODE_STEPS * (image.step)(median_inverse_depth(image));
     steps.retain(|(_, step)| f64::from(step.abs()) > contour);

@@ -21,11 +21,11 @@ mod target;
 
 pub(crate) use affine::MAD_TO_SIGMA;
 pub use affine::{AffineFit, Effort, fit_affine_robust};
+pub use bands::find_target;
 pub(crate) use image::MIN_PIXELS;
 pub use image::{Exclusions, InverseDepthImage, Target};
 pub use paper::{Points, RansacPlane, ransac_plane};
 pub use ransac::RansacOptions;
-pub use target::find_target;
 
 use nalgebra::{Unit, Vector3};
 

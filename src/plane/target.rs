@@ -2,7 +2,6 @@
 //! looks at.
 
 use super::affine::AffineFit;
-use super::bands::without_bands;
 use super::border::beside;
 use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
 use super::curved::curved_target;
@@ -16,13 +15,11 @@ use crate::stats::median_in_place;
 use crate::view::Region;
 
 /// The plane in `region`, or else the one the principal point looks at; or why there is none.
-pub fn find_target(
+pub(super) fn target_in(
     image: &InverseDepthImage<'_>,
     region: Option<&Region>,
     rng: &mut Stream,
 ) -> Result<Target, String> {
-    let without_bands = without_bands(image);
-    let image = &InverseDepthImage { w: without_bands.as_deref().unwrap_or(image.w), ..*image };
     match region {
         Some(region) => in_region(image, region, rng),
         None => at_principal_point(image, rng),
