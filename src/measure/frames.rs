@@ -136,16 +136,20 @@ impl<'v> TargetFrames<'v> {
         let (numbers, mut held) = reader.hold(view)?;
         let target = target_of(view, bench, &held)?;
         let mut scan = Scan::begin(bench, &target, &held);
-        let stale = held.iter().filter(|frame| scan.shifts(frame).is_none()).count();
+        let shown: Vec<bool> = held.iter().map(|frame| scan.shifts(frame).is_some()).collect();
+        let stale = shown.iter().filter(|shown| !**shown).count();
         let moves = stale as f64 > MAX_STALE * held.len() as f64;
         let first: Box<dyn Iterator<Item = _>> = if held.len() == 1 && reader.repeated > 0 {
             let frames = reader.repeated + 1;
             reader.repeated = 0;
             Box::new(std::iter::repeat_n(held.swap_remove(0), frames).enumerate())
         } else {
-            Box::new(numbers.into_iter().zip(held))
+            let taken = shown.into_iter().map(move |shown| shown || moves);
+            let first = numbers.into_iter().zip(held).zip(taken);
+            Box::new(first.filter_map(|(frame, taken)| taken.then_some(frame)))
         };
-        Ok(TargetFrames { target, stale: 0, first, reader, scan: (!moves).then_some(scan) })
+        let (stale, scan) = if moves { (0, None) } else { (stale, Some(scan)) };
+        Ok(TargetFrames { target, stale, first, reader, scan })
     }
 
     /// How many of the frames up to here repeat the one before.
@@ -158,8 +162,11 @@ impl Iterator for TargetFrames<'_> {
     type Item = (usize, Frame);
 
     fn next(&mut self) -> Option<(usize, Frame)> {
+        if let Some(frame) = self.first.next() {
+            return Some(frame);
+        }
         loop {
-            let (number, frame) = self.first.next().or_else(|| self.reader.next())?;
+            let (number, frame) = self.reader.next()?;
             if self.scan.as_mut().is_none_or(|scan| scan.shifts(&frame).is_some()) {
                 return Some((number, frame));
             }
