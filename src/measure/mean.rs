@@ -12,6 +12,8 @@ const STRAY_SIGMAS: f32 = 10.0;
 const STRAY_STEPS: f32 = 3.0;
 /// Pixels that tell the usual deviation.
 const ASKED: usize = 5000;
+/// A frame with a larger share of strays is left out whole: where its scene crosses the right one it has none.
+const MAX_STRAYS: f64 = 0.2;
 
 /// Mean over the frames, where at least half of them measured; 1/m, NaN elsewhere. Of three readings or more
 /// those far from their median do not count: a stale or damaged frame would move the target.
@@ -20,33 +22,61 @@ pub(super) fn mean_inverse_depth(
     bench: &Workbench<'_>,
     words_a_step: f64,
 ) -> Vec<f32> {
+    let all: Vec<&Frame> = frames.iter().collect();
+    let usual = usual_scatter(&all, &bench.table);
+    let far = |w: f32| {
+        f32::max(STRAY_SIGMAS * usual, STRAY_STEPS * bench.step(words_a_step, f64::from(w)) as f32)
+    };
+    let frames = &of_one_scene(all, &bench.table, far)[..];
     let seen = Seen::of(frames, &bench.table);
-    let usual = usual_scatter(frames, &bench.table);
     let mean = |i: usize| {
         let (n, low, high) = (usize::from(seen.count[i]), seen.low[i], seen.high[i]);
         if n == 0 || 2 * n < frames.len() {
             return f32::NAN;
         }
-        let step = || bench.step(words_a_step, f64::from(low)) as f32;
-        if n >= MAJORITY && high - low > STRAY_SIGMAS * usual {
-            let far = f32::max(STRAY_SIGMAS * usual, STRAY_STEPS * step());
-            if high - low > far {
-                return without_strays(readings(frames, &bench.table, i), far);
-            }
+        if n >= MAJORITY && high - low > STRAY_SIGMAS * usual && high - low > far(low) {
+            return without_strays(readings(frames, &bench.table, i), far(low));
         }
         seen.sum[i] / f32::from(seen.count[i])
     };
     (0..seen.sum.len()).map(mean).collect()
 }
 
+/// The frames less those that show another scene than most do.
+fn of_one_scene<'f>(
+    frames: Vec<&'f Frame>,
+    table: &DepthTable,
+    far: impl Fn(f32) -> f32,
+) -> Vec<&'f Frame> {
+    let pixels = frames[0].raw.len();
+    let mut counts = vec![(0u32, 0u32); frames.len()];
+    for i in (0..pixels).step_by((pixels / ASKED).max(1)) {
+        let mut w = readings(&frames, table, i);
+        if w.len() < MAJORITY {
+            continue;
+        }
+        let median = median_in_place(&mut w);
+        for (frame, (strays, measured)) in frames.iter().zip(&mut counts) {
+            let off = (1.0 / table.metres(frame.raw[i]) - median).abs();
+            *measured += u32::from(off.is_finite());
+            *strays += u32::from(off.is_finite() && off > far(median));
+        }
+    }
+    let right =
+        |(strays, measured): &(u32, u32)| f64::from(*strays) <= MAX_STRAYS * f64::from(*measured);
+    let kept: Vec<&Frame> =
+        frames.iter().zip(&counts).filter(|(_, c)| right(c)).map(|(f, _)| *f).collect();
+    if 2 * kept.len() > frames.len() { kept } else { frames }
+}
+
 /// Inverse depths that a pixel shows in its frames, 1/m.
-fn readings(frames: &[Frame], table: &DepthTable, pixel: usize) -> Vec<f32> {
+fn readings(frames: &[&Frame], table: &DepthTable, pixel: usize) -> Vec<f32> {
     let w = frames.iter().map(|f| 1.0 / table.metres(f.raw[pixel]));
     w.filter(|w| w.is_finite()).collect()
 }
 
 /// What a reading is off the median of its pixel by, 1/m: the middle over the picture, as a standard deviation.
-fn usual_scatter(frames: &[Frame], table: &DepthTable) -> f32 {
+fn usual_scatter(frames: &[&Frame], table: &DepthTable) -> f32 {
     let pixels = frames[0].raw.len();
     let mut off = Vec::new();
     for i in (0..pixels).step_by((pixels / ASKED).max(1)) {
@@ -75,7 +105,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(frames: &[Frame], table: &DepthTable) -> Self {
+    fn of(frames: &[&Frame], table: &DepthTable) -> Self {
         let n = frames[0].raw.len();
         let mut seen = Seen {
             sum: vec![0.0; n],
