@@ -140,16 +140,19 @@ pub(super) fn few_frames(fields: &[Field]) -> Option<String> {
 /// Frames that were left out, and why.
 pub(super) fn frames_left_out(fields: &[Field]) -> Vec<String> {
     let sum = |of: &dyn Fn(&Field) -> usize| fields.iter().map(of).sum::<usize>();
-    let all = sum(&|f| f.repeated + f.stale + f.frames.len());
-    let told =
-        |n: usize, why: &str| (n > 0).then(|| format!("{n} of {all} frames were left out: {why}"));
-    let repeated = told(sum(&|f| f.repeated), "they are word for word the frame before");
+    let all = sum(&|f| f.repeated + f.stale + f.lost_frames + f.frames.len());
+    let told = |n: usize, why: &str| {
+        let were = if n == 1 { "was" } else { "were" };
+        (n > 0).then(|| format!("{n} of {all} frames {were} left out: {why}"))
+    };
+    let repeated = told(sum(&|f| f.repeated), "word for word the frame before");
+    let lost = told(sum(&|f| f.lost_frames), "it cannot be read, or no pixel carries a depth");
     let stale = told(
         sum(&|f| f.stale),
-        "most of the target is not where the first frames of their view show it; they are stale or damaged, \
-         or something was moved",
+        "most of the target is not where the other first frames of the view show it; such a frame is stale or \
+         damaged, or the frames jitter",
     );
-    repeated.into_iter().chain(stale).collect()
+    repeated.into_iter().chain(lost).chain(stale).collect()
 }
 
 /// The model with what was found.

@@ -114,20 +114,19 @@ pub(super) fn failed(view: &View, what: String, remedy: &'static str) -> Error {
 
 /// The frames that show a view's target, with their numbers in the view.
 ///
-/// Frames that repeat the one before are left out, unless all of the view are alike; so are a few in which most of
-/// the target is not where the first frames show it.
+/// Frames that repeat the one before are left out, unless all of the view are alike; so are a few of the first ones
+/// in which most of the target is elsewhere. Later ones stay: what moves is for the diagnosis to tell.
 pub struct TargetFrames<'v> {
     pub target: Target,
-    /// How many of the frames up to here show it elsewhere.
+    /// How many of the first frames show it elsewhere.
     pub stale: usize,
     first: Box<dyn Iterator<Item = (usize, Frame)> + 'v>,
     reader: FrameReader<'v>,
-    /// Where the first frames show the target; `None` where that leaves no frame out.
-    scan: Option<Scan<'v>>,
 }
 
-/// Where a larger share of the first frames shows the target elsewhere they are not stale: something moves.
-const MAX_STALE: f64 = 0.25;
+/// One stale frame is usual where a recording begins; of eight, a second may be. Where more of the first frames show
+/// the target elsewhere, it moves or they jitter.
+const MAX_STALE: [usize; 2] = [1, 2];
 
 impl<'v> TargetFrames<'v> {
     /// An error when no frame can be read or none shows a plane.
@@ -137,24 +136,30 @@ impl<'v> TargetFrames<'v> {
         let target = target_of(view, bench, &held)?;
         let mut scan = Scan::begin(bench, &target, &held);
         let shown: Vec<bool> = held.iter().map(|frame| scan.shifts(frame).is_some()).collect();
-        let stale = shown.iter().filter(|shown| !**shown).count();
-        let moves = stale as f64 > MAX_STALE * held.len() as f64;
+        let elsewhere = shown.iter().filter(|shown| !**shown).count();
+        let moves = elsewhere > MAX_STALE[usize::from(held.len() == HELD_FRAMES)];
         let first: Box<dyn Iterator<Item = _>> = if held.len() == 1 && reader.repeated > 0 {
-            let frames = reader.repeated + 1;
+            let alike = numbers[0]..=numbers[0] + reader.repeated;
             reader.repeated = 0;
-            Box::new(std::iter::repeat_n(held.swap_remove(0), frames).enumerate())
+            let frame = held.swap_remove(0);
+            Box::new(alike.map(move |number| (number, frame.clone())))
         } else {
             let taken = shown.into_iter().map(move |shown| shown || moves);
             let first = numbers.into_iter().zip(held).zip(taken);
             Box::new(first.filter_map(|(frame, taken)| taken.then_some(frame)))
         };
-        let (stale, scan) = if moves { (0, None) } else { (stale, Some(scan)) };
-        Ok(TargetFrames { target, stale, first, reader, scan })
+        let stale = if moves { 0 } else { elsewhere };
+        Ok(TargetFrames { target, stale, first, reader })
     }
 
     /// How many of the frames up to here repeat the one before.
     pub fn repeated(&self) -> usize {
         self.reader.repeated
+    }
+
+    /// How many of them cannot be read or carry no depth.
+    pub fn lost(&self) -> usize {
+        self.reader.notes.len()
     }
 }
 
@@ -162,15 +167,6 @@ impl Iterator for TargetFrames<'_> {
     type Item = (usize, Frame);
 
     fn next(&mut self) -> Option<(usize, Frame)> {
-        if let Some(frame) = self.first.next() {
-            return Some(frame);
-        }
-        loop {
-            let (number, frame) = self.reader.next()?;
-            if self.scan.as_mut().is_none_or(|scan| scan.shifts(&frame).is_some()) {
-                return Some((number, frame));
-            }
-            self.stale += 1;
-        }
+        self.first.next().or_else(|| self.reader.next())
     }
 }

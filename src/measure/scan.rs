@@ -12,6 +12,9 @@ use crate::residual::perpendicular_per_axial;
 /// Frames held while the target and the scale are found; more would not make them surer.
 pub(super) const HELD_FRAMES: usize = 8;
 
+/// A frame that measures a smaller share of the target shows nothing elsewhere: it lost it.
+const MIN_MEASURED: f64 = 0.1;
+
 pub(super) struct Scan<'a> {
     pub(super) bench: &'a Workbench<'a>,
     /// Pixels grouped by cell, in image order inside a cell.
@@ -119,7 +122,8 @@ impl<'a> Scan<'a> {
             measured += stride * residuals.len();
             offsets.push(offset);
         }
-        if self.follow.held >= MAJORITY && 2 * kept < measured {
+        let told = measured as f64 > MIN_MEASURED * self.pixels.len() as f64;
+        if self.follow.held >= MAJORITY && told && 2 * kept < measured {
             return None;
         }
         self.follow.last.clone_from(&offsets);

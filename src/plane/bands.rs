@@ -15,14 +15,20 @@ const WINDOW: usize = 4;
 const ROWS: usize = 120;
 /// A column is judged by this many rows at least.
 const MIN_ROWS: usize = 30;
-/// Share of the rows on either side of which the step must have the same sign: what stands in the
-/// scene ends somewhere, a band of the firmware goes through all of the picture.
+/// Share of the rows that may step the other way, by their noise: what stands in the scene ends somewhere, a band of
+/// the firmware goes through all of the picture.
 const TAIL: f64 = 0.1;
-/// The steps of a picture are one step of the firmware, measured to this factor; larger ones are the
+/// The steps of a picture are one step of the firmware, measured to this factor about their median; others are the
 /// upright edges of a board that is higher than the picture.
 const MAX_UNEQUAL: f64 = 2.0;
-/// ... and more than so many steps of the depth code: a tilted plane has contours of one.
+/// Bands are equally wide, and steps of some may be hidden: distances are multiples of the least to this share of it.
+const UNEVEN: f64 = 0.15;
+/// Two steps are found between three doors; a Kinect has up to eight bands (OpenNI, GmcMode).
+const MIN_STEPS: usize = 3;
+/// A band's step is more than so many steps of the depth code: most contours of a tilted plane are of one.
 const MIN_CODE_STEPS: f64 = 1.5;
+/// Where a larger share of the pixels equals the next one the noise is below the code: steps are its contours.
+const MAX_EQUAL: f64 = 0.8;
 
 /// The plane in `region`, or else the one the principal point looks at; or why there is none.
 pub fn find_target(
@@ -34,15 +40,18 @@ pub fn find_target(
     let Some(w) = without_bands(image) else { return target };
     let size = |target: &Target| target.pixels.len() as f64;
     let whole = target_in(&InverseDepthImage { w: &w, ..*image }, region, rng);
-    match (&target, &whole) {
-        (Ok(found), Ok(whole)) if size(whole) < CUT_BY_BANDS * size(found) => target,
-        (Ok(_), Err(_)) => target,
-        _ => whole,
+    match (&target, whole) {
+        (Ok(found), Ok(whole)) if size(&whole) < CUT_BY_BANDS * size(found) => target,
+        (_, Ok(mut whole)) => {
+            whole.notes.push("it was found across columns that step alike in all rows".into());
+            Ok(whole)
+        }
+        (_, Err(_)) => target,
     }
 }
 
-/// Where bands of the firmware cut the target off it is larger without them by more than this: they are narrower
-/// than a third of the picture. What else steps at one column, such as contours of a steep plane, cuts nothing off.
+/// Where bands of the firmware cut the target off it is larger without them by more than this: of three bands two
+/// are lost. What else steps at one column, such as contours of a steep plane, cuts nothing off.
 const CUT_BY_BANDS: f64 = 1.2;
 
 /// The image without its bands; `None` where it has none.
@@ -50,20 +59,31 @@ const CUT_BY_BANDS: f64 = 1.2;
 /// Steps of a saw-tooth all go one way and are equal. They are taken out with the slope between them, so that
 /// the mean plane stays.
 fn without_bands(image: &InverseDepthImage<'_>) -> Option<Vec<f32>> {
-    let (width, mut steps) = (image.camera.width, steps(image));
-    let contour = MIN_CODE_STEPS * (image.step)(median_inverse_depth(image));
-    steps.retain(|(_, step)| f64::from(step.abs()) > contour);
-    let [low, _] = range(steps.iter().map(|(_, step)| step.abs().into()));
-    steps.retain(|(_, step)| f64::from(step.abs()) <= MAX_UNEQUAL * low);
-    let one_way = steps.iter().all(|(_, s)| *s > 0.0) || steps.iter().all(|(_, s)| *s < 0.0);
-    if steps.len() < 2 || !one_way {
-        return None;
-    }
+    let (width, steps) = (image.camera.width, bands_of(image)?);
     let stairs: Vec<f64> = (0..width)
         .map(|u| steps.iter().filter(|(at, _)| *at <= u).map(|(_, s)| f64::from(*s)).sum())
         .collect();
     let teeth = less_line(&stairs);
     Some(image.w.iter().enumerate().map(|(i, w)| w - teeth[i % width]).collect())
+}
+
+/// Steps that are one step of the firmware: equal, one way, at even distances, and more than the code's.
+fn bands_of(image: &InverseDepthImage<'_>) -> Option<Vec<(usize, f32)>> {
+    let contour = MIN_CODE_STEPS * (image.step)(median_inverse_depth(image));
+    let mut steps = steps(image);
+    steps.retain(|(_, step)| f64::from(step.abs()) > contour);
+    let usual = f64::from(median_in_place(&mut steps.iter().map(|s| s.1).collect::<Vec<_>>()));
+    steps.retain(|(_, step)| {
+        let share = f64::from(*step) / usual;
+        (1.0 / MAX_UNEQUAL..=MAX_UNEQUAL).contains(&share)
+    });
+    let apart: Vec<f64> = steps.windows(2).map(|pair| (pair[1].0 - pair[0].0) as f64).collect();
+    let [least, _] = range(apart.iter().copied());
+    let even = |gap: &f64| (gap / least - (gap / least).round()).abs() < UNEVEN;
+    let equal = image.w.windows(2).filter(|pair| pair[0] == pair[1]).count() as f64;
+    let measured = image.w.iter().filter(|w| w.is_finite()).count() as f64;
+    let found = steps.len() >= MIN_STEPS && apart.iter().all(even) && equal < MAX_EQUAL * measured;
+    found.then_some(steps)
 }
 
 fn median_inverse_depth(image: &InverseDepthImage<'_>) -> f64 {
@@ -171,7 +191,7 @@ mod tests {
         }
     }
 
-    /// Nor are the edges of a board, of a shelf's boards, or of two doors bands of the firmware.
+    /// Edges of a board, of a shelf's boards, of one door or of three are no bands of the firmware.
     #[test]
     fn what_stands_in_the_scene_is_no_band() {
         assert!(found(&wall(2e-4, |_, _| 0.0)).is_none());
@@ -181,5 +201,7 @@ mod tests {
         assert!(found(&wall(0.0, shelf)).is_none());
         let door = |u: usize, _: usize| if u > 200 { 0.02 } else { 0.0 };
         assert!(found(&wall(0.0, door)).is_none());
+        let doors = |u: usize, _: usize| 0.02 * (u / 110) as f64;
+        assert!(found(&wall(0.0, doors)).is_none());
     }
 }

@@ -310,10 +310,8 @@ fn a_frame_stored_twice_is_one_frame() {
     assert_eq!(once, twice);
     assert_eq!(found, found_twice);
     let frames: usize = recording.views.iter().map(|v| v.depth.len()).sum();
-    let told = format!(
-        "{frames} of {} frames were left out: they are word for word the frame before",
-        2 * frames
-    );
+    let told =
+        format!("{frames} of {} frames were left out: word for word the frame before", 2 * frames);
     assert!(remarks.contains(&told), "{remarks:?}");
 }
 
@@ -342,6 +340,7 @@ fn a_stale_frame_is_left_out_of_the_diagnosis_and_told() {
     };
     let [(right, names, _), (verdict, same, remarks)] = [&recording, &stale].map(judged);
     assert_eq!((verdict, same), (right, names));
-    let told = remarks.iter().find(|r| r.contains("not where the first frames")).expect("a remark");
+    let told =
+        remarks.iter().find(|r| r.contains("not where the other first frames")).expect("a remark");
     assert!(told.starts_with("2 of "), "{told}");
 }

@@ -56,6 +56,8 @@ pub struct Field {
     pub repeated: usize,
     /// Frames that show the target elsewhere than the first ones do, and were left out.
     pub stale: usize,
+    /// Frames that cannot be read or carry no depth.
+    pub lost_frames: usize,
     /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
     pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
@@ -105,6 +107,7 @@ impl Field {
         field.accumulate(timed, bench, sigma, known, session_start);
         field.repeated = frames.repeated();
         field.stale = frames.stale;
+        field.lost_frames = frames.lost();
         field.read_infrared(view, &bench.rays);
         Ok(field)
     }
@@ -242,6 +245,7 @@ impl Field {
             temperature_c: None,
             repeated: 0,
             stale: 0,
+            lost_frames: 0,
             ambient_lux: None,
             light: Vec::new(),
             infrared: None,
