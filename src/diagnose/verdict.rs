@@ -146,7 +146,7 @@ pub(super) fn frames_left_out(fields: &[Field]) -> Vec<String> {
         (n > 0).then(|| format!("{n} of {all} frames {were} left out: {why}"))
     };
     let repeated = told(sum(&|f| f.repeated), "word for word the frame before");
-    let lost = told(sum(&|f| f.lost_frames), "it cannot be read, or no pixel carries a depth");
+    let lost = told(sum(&|f| f.lost_frames), "unreadable, or no pixel carries a depth");
     let stale = told(
         sum(&|f| f.stale),
         "most of the target is not where the other first frames of the view show it; such a frame is stale or \
