@@ -168,9 +168,14 @@ mod tests {
         (camera, (0..320 * 240).map(at).collect())
     }
 
-    fn found((camera, w): &(Camera, Vec<f32>)) -> Option<Vec<f32>> {
+    fn found(image: &(Camera, Vec<f32>)) -> Option<Vec<f32>> {
+        in_code(image, 0.0)
+    }
+
+    /// By a depth code with this step, 1/m.
+    fn in_code((camera, w): &(Camera, Vec<f32>), step: f64) -> Option<Vec<f32>> {
         let rays = camera.rays();
-        without_bands(&InverseDepthImage { w, rays: &rays, camera, step: &|_| 0.0 })
+        without_bands(&InverseDepthImage { w, rays: &rays, camera, step: &|_| step })
     }
 
     /// Of a saw-tooth of either direction, on a tilted wall, less than a sigma is left.
@@ -189,6 +194,28 @@ mod tests {
                 assert!((f64::from(mean) - plane).abs() < NOISE, "{slope} {tooth} at {u}: {mean}");
             }
         }
+    }
+
+    /// The wall is found whole, and told how; a wall without bands is found as ever.
+    #[test]
+    fn bands_do_not_cut_the_target_off() {
+        for (tooth, banded) in [(0.02, true), (0.0, false)] {
+            let saw = |u: usize, _: usize| tooth * ((u + 13) as f64 / 53.0).fract();
+            let (camera, w) = wall(0.0, saw);
+            let rays = camera.rays();
+            let image = InverseDepthImage { w: &w, rays: &rays, camera: &camera, step: &|_| 1e-3 };
+            let target = find_target(&image, None, &mut Seed(1).stream("target")).expect("a wall");
+            assert!(target.pixels.len() > 60_000, "{tooth}: {} pixels", target.pixels.len());
+            assert_eq!(target.notes.iter().any(|note| note.contains("step alike")), banded);
+        }
+    }
+
+    /// Contours of a depth code on a tilted plane: of its own step.
+    #[test]
+    fn steps_of_the_code_are_no_bands() {
+        let saw = |u: usize, _: usize| 0.01 * ((u + 13) as f64 / 53.0).fract();
+        assert!(in_code(&wall(5e-4, saw), 0.005).is_some());
+        assert!(in_code(&wall(5e-4, saw), 0.01).is_none());
     }
 
     /// Edges of a board, of a shelf's boards, of one door or of three are no bands of the firmware.
