@@ -139,16 +139,18 @@ pub(super) fn few_frames(fields: &[Field]) -> Option<String> {
 
 /// Frames that were left out, and why.
 pub(super) fn frames_left_out(fields: &[Field]) -> Vec<String> {
-    let sum = |of: &dyn Fn(&Field) -> usize| fields.iter().map(of).sum::<usize>();
-    let all = sum(&|f| f.repeated + f.stale + f.lost_frames + f.frames.len());
+    let sum = |of: fn(&Field) -> usize| fields.iter().map(of).sum::<usize>();
+    let [repeated, stale, lost] =
+        [sum(|f| f.left_out.repeated), sum(|f| f.left_out.stale), sum(|f| f.left_out.lost)];
+    let all = repeated + stale + lost + sum(|f| f.frames.len());
     let told = |n: usize, why: &str| {
         let were = if n == 1 { "was" } else { "were" };
         (n > 0).then(|| format!("{n} of {all} frames {were} left out: {why}"))
     };
-    let repeated = told(sum(&|f| f.repeated), "word for word the frame before");
-    let lost = told(sum(&|f| f.lost_frames), "unreadable, or no pixel carries a depth");
+    let repeated = told(repeated, "word for word the frame before");
+    let lost = told(lost, "unreadable, or no pixel carries a depth");
     let stale = told(
-        sum(&|f| f.stale),
+        stale,
         "most of the target is not where the other first frames of the view show it; such a frame is stale or \
          damaged, or the frames jitter",
     );

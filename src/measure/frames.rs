@@ -1,6 +1,7 @@
 //! A view's target, and its frames one after the other: those that can be read and tell something new.
 
 use super::Workbench;
+use super::follow::MAJORITY;
 use super::grouping::words_a_step;
 use super::mean::mean_inverse_depth;
 use super::scan::{HELD_FRAMES, Scan};
@@ -112,15 +113,24 @@ pub(super) fn failed(view: &View, what: String, remedy: &'static str) -> Error {
     Error::View { view: view.name.clone(), what, remedy }
 }
 
+/// Frames that were not handed out, and why.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LeftOut {
+    /// Word for word the one before.
+    pub repeated: usize,
+    /// They show the target elsewhere than the other first frames do.
+    pub stale: usize,
+    /// They cannot be read, or carry no depth.
+    pub lost: usize,
+}
+
 /// The frames that show a view's target, with their numbers in the view.
 ///
 /// Frames that repeat the one before are left out, unless all of the view are alike; so are a few of the first ones
 /// in which most of the target is elsewhere. Later ones stay: what moves is for the diagnosis to tell.
 pub struct TargetFrames<'v> {
-    pub target: Target,
-    /// How many of the first frames show it elsewhere.
-    pub stale: usize,
     first: Box<dyn Iterator<Item = (usize, Frame)> + 'v>,
+    stale: usize,
     reader: FrameReader<'v>,
 }
 
@@ -129,37 +139,35 @@ pub struct TargetFrames<'v> {
 const MAX_STALE: [usize; 2] = [1, 2];
 
 impl<'v> TargetFrames<'v> {
-    /// An error when no frame can be read or none shows a plane.
-    pub fn of(view: &'v View, bench: &'v Workbench<'_>) -> Result<Self> {
+    /// And the target. An error when no frame can be read or none shows a plane.
+    pub fn of(view: &'v View, bench: &'v Workbench<'_>) -> Result<(Target, Self)> {
         let mut reader = FrameReader::of(view, bench);
         let (numbers, mut held) = reader.hold(view)?;
         let target = target_of(view, bench, &held)?;
-        let mut scan = Scan::begin(bench, &target, &held);
-        let shown: Vec<bool> = held.iter().map(|frame| scan.shifts(frame).is_some()).collect();
-        let elsewhere = shown.iter().filter(|shown| !**shown).count();
-        let moves = elsewhere > MAX_STALE[usize::from(held.len() == HELD_FRAMES)];
-        let first: Box<dyn Iterator<Item = _>> = if held.len() == 1 && reader.repeated > 0 {
+        if held.len() == 1 && reader.repeated > 0 {
             let alike = numbers[0]..=numbers[0] + reader.repeated;
             reader.repeated = 0;
             let frame = held.swap_remove(0);
-            Box::new(alike.map(move |number| (number, frame.clone())))
-        } else {
-            let taken = shown.into_iter().map(move |shown| shown || moves);
-            let first = numbers.into_iter().zip(held).zip(taken);
-            Box::new(first.filter_map(|(frame, taken)| taken.then_some(frame)))
-        };
+            let first = Box::new(alike.map(move |number| (number, frame.clone())));
+            return Ok((target, TargetFrames { first, stale: 0, reader }));
+        }
+        let mut taken = vec![true; held.len()];
+        if held.len() >= MAJORITY {
+            let mut scan = Scan::begin(bench, &target, &held);
+            taken = held.iter().map(|frame| scan.shifts(frame).is_some()).collect();
+        }
+        let elsewhere = taken.iter().filter(|taken| !**taken).count();
+        let moves = elsewhere > MAX_STALE[usize::from(held.len() == HELD_FRAMES)];
+        let first = numbers.into_iter().zip(held).zip(taken);
+        let first = first.filter_map(move |(frame, taken)| (taken || moves).then_some(frame));
         let stale = if moves { 0 } else { elsewhere };
-        Ok(TargetFrames { target, stale, first, reader })
+        Ok((target, TargetFrames { first: Box::new(first), stale, reader }))
     }
 
-    /// How many of the frames up to here repeat the one before.
-    pub fn repeated(&self) -> usize {
-        self.reader.repeated
-    }
-
-    /// How many of them cannot be read or carry no depth.
-    pub fn lost(&self) -> usize {
-        self.reader.notes.len()
+    /// Of the frames up to here.
+    pub fn left_out(&self) -> LeftOut {
+        let FrameReader { repeated, notes, .. } = &self.reader;
+        LeftOut { repeated: *repeated, stale: self.stale, lost: notes.len() }
     }
 }
 

@@ -22,12 +22,12 @@ pub(super) fn mean_inverse_depth(
     bench: &Workbench<'_>,
     words_a_step: f64,
 ) -> Vec<f32> {
-    let all: Vec<&Frame> = frames.iter().collect();
-    let usual = usual_scatter(&all, &bench.table);
+    let asked = asked(frames, &bench.table);
+    let usual = usual_scatter(&asked);
     let far = |w: f32| {
         f32::max(STRAY_SIGMAS * usual, STRAY_STEPS * bench.step(words_a_step, f64::from(w)) as f32)
     };
-    let frames = &of_one_scene(all, &bench.table, far)[..];
+    let frames = &of_one_scene(frames, &asked, far)[..];
     let seen = Seen::of(frames, &bench.table);
     let mean = |i: usize| {
         let (n, low, high) = (usize::from(seen.count[i]), seen.low[i], seen.high[i]);
@@ -42,31 +42,39 @@ pub(super) fn mean_inverse_depth(
     (0..seen.sum.len()).map(mean).collect()
 }
 
+/// Some pixels, spread over the picture: the median over their frames, 1/m, and what each frame is off it, NaN where it
+/// has no depth.
+fn asked(frames: &[Frame], table: &DepthTable) -> Vec<(f32, Vec<f32>)> {
+    let pixels = frames[0].raw.len();
+    let of_pixel = |i: usize| {
+        let w: Vec<f32> = frames.iter().map(|f| 1.0 / table.metres(f.raw[i])).collect();
+        let mut measured: Vec<f32> = w.iter().copied().filter(|w| w.is_finite()).collect();
+        let median = median_in_place(&mut measured);
+        (median, w.into_iter().map(|w| w - median).collect())
+    };
+    (0..pixels).step_by((pixels / ASKED).max(1)).map(of_pixel).collect()
+}
+
 /// The frames less those that show another scene than most do.
 fn of_one_scene<'f>(
-    frames: Vec<&'f Frame>,
-    table: &DepthTable,
+    frames: &'f [Frame],
+    asked: &[(f32, Vec<f32>)],
     far: impl Fn(f32) -> f32,
 ) -> Vec<&'f Frame> {
-    let pixels = frames[0].raw.len();
-    let mut counts = vec![(0u32, 0u32); frames.len()];
-    for i in (0..pixels).step_by((pixels / ASKED).max(1)) {
-        let mut w = readings(&frames, table, i);
-        if w.len() < MAJORITY {
-            continue;
-        }
-        let median = median_in_place(&mut w);
-        for (frame, (strays, measured)) in frames.iter().zip(&mut counts) {
-            let off = (1.0 / table.metres(frame.raw[i]) - median).abs();
-            *measured += u32::from(off.is_finite());
-            *strays += u32::from(off.is_finite() && off > far(median));
-        }
-    }
-    let right =
-        |(strays, measured): &(u32, u32)| f64::from(*strays) <= MAX_STRAYS * f64::from(*measured);
-    let kept: Vec<&Frame> =
-        frames.iter().zip(&counts).filter(|(_, c)| right(c)).map(|(f, _)| *f).collect();
-    if 2 * kept.len() > frames.len() { kept } else { frames }
+    let measured = |off: &&Vec<f32>| off.iter().filter(|off| off.is_finite()).count();
+    let told: Vec<(f32, &Vec<f32>)> = asked
+        .iter()
+        .map(|(median, off)| (far(*median), off))
+        .filter(|(_, off)| measured(off) >= MAJORITY)
+        .collect();
+    let right = |frame: usize| {
+        let off = || told.iter().map(|(far, off)| (far, off[frame].abs()));
+        let measured = off().filter(|(_, off)| off.is_finite()).count();
+        let strays = off().filter(|(far, off)| off.is_finite() && off > *far).count();
+        strays as f64 <= MAX_STRAYS * measured as f64
+    };
+    let kept: Vec<&Frame> = (0..frames.len()).filter(|&k| right(k)).map(|k| &frames[k]).collect();
+    if 2 * kept.len() > frames.len() { kept } else { frames.iter().collect() }
 }
 
 /// Inverse depths that a pixel shows in its frames, 1/m.
@@ -76,14 +84,9 @@ fn readings(frames: &[&Frame], table: &DepthTable, pixel: usize) -> Vec<f32> {
 }
 
 /// What a reading is off the median of its pixel by, 1/m: the middle over the picture, as a standard deviation.
-fn usual_scatter(frames: &[&Frame], table: &DepthTable) -> f32 {
-    let pixels = frames[0].raw.len();
-    let mut off = Vec::new();
-    for i in (0..pixels).step_by((pixels / ASKED).max(1)) {
-        let mut w = readings(frames, table, i);
-        let median = median_in_place(&mut w);
-        off.extend(w.iter().map(|w| (w - median).abs()));
-    }
+fn usual_scatter(asked: &[(f32, Vec<f32>)]) -> f32 {
+    let off = asked.iter().flat_map(|(_, off)| off).map(|off| off.abs());
+    let mut off: Vec<f32> = off.filter(|off| off.is_finite()).collect();
     MAD_TO_SIGMA as f32 * median_in_place(&mut off)
 }
 

@@ -19,7 +19,7 @@ mod view;
 pub use budget::flatness_uncertainty_m;
 pub use cells::{Cell, Spread};
 pub use column_steps::ColumnSteps;
-pub use frames::{TargetFrames, view_target};
+pub use frames::{LeftOut, TargetFrames, view_target};
 pub(crate) use grouping::words_a_step;
 pub use table::{SigmaKind, SigmaRow, SigmaTable, read_table, write_measurements};
 pub use view::{measure_view, ranges_remark, without_copies};

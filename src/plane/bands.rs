@@ -80,10 +80,12 @@ fn bands_of(image: &InverseDepthImage<'_>) -> Option<Vec<(usize, f32)>> {
     let apart: Vec<f64> = steps.windows(2).map(|pair| (pair[1].0 - pair[0].0) as f64).collect();
     let [least, _] = range(apart.iter().copied());
     let even = |gap: &f64| (gap / least - (gap / least).round()).abs() < UNEVEN;
+    if steps.len() < MIN_STEPS || !apart.iter().all(even) {
+        return None;
+    }
     let equal = image.w.windows(2).filter(|pair| pair[0] == pair[1]).count() as f64;
     let measured = image.w.iter().filter(|w| w.is_finite()).count() as f64;
-    let found = steps.len() >= MIN_STEPS && apart.iter().all(even) && equal < MAX_EQUAL * measured;
-    found.then_some(steps)
+    (equal < MAX_EQUAL * measured).then_some(steps)
 }
 
 fn median_inverse_depth(image: &InverseDepthImage<'_>) -> f64 {

@@ -12,7 +12,7 @@ use crate::diagnose::steps::lattice::RawHistogram;
 use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::measure::{ColumnSteps, TargetFrames, Workbench};
+use crate::measure::{ColumnSteps, LeftOut, TargetFrames, Workbench};
 use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::stats::median_in_place;
@@ -52,12 +52,7 @@ pub struct Field {
     pub first: Vec<Vec<f32>>,
     /// Time and mean residual of each frame, s since the first and px.
     pub frames: Vec<(f64, f64)>,
-    /// Frames that are word for word the one before, and were left out.
-    pub repeated: usize,
-    /// Frames that show the target elsewhere than the first ones do, and were left out.
-    pub stale: usize,
-    /// Frames that cannot be read or carry no depth.
-    pub lost_frames: usize,
+    pub left_out: LeftOut,
     /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
     pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
@@ -97,17 +92,13 @@ impl Field {
         known: &KnownTerms,
         session_start: f64,
     ) -> Result<Self> {
-        let mut frames = TargetFrames::of(view, bench)?;
-        let target = &mut frames.target;
-        let pixels = std::mem::take(&mut target.pixels);
-        let mut field = Field::empty(view, bench.sensor, target.plane, pixels);
+        let (target, mut frames) = TargetFrames::of(view, bench)?;
+        let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
         field.spread_px = (target.scale * field.scale_px_m) as f32;
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
         let timed = frames.by_ref().map(|(k, frame)| (view.depth[k].timestamp - start, frame));
         field.accumulate(timed, bench, sigma, known, session_start);
-        field.repeated = frames.repeated();
-        field.stale = frames.stale;
-        field.lost_frames = frames.lost();
+        field.left_out = frames.left_out();
         field.read_infrared(view, &bench.rays);
         Ok(field)
     }
@@ -243,9 +234,7 @@ impl Field {
             reference_distance_m: None,
             flatness_m: None,
             temperature_c: None,
-            repeated: 0,
-            stale: 0,
-            lost_frames: 0,
+            left_out: LeftOut::default(),
             ambient_lux: None,
             light: Vec::new(),
             infrared: None,
