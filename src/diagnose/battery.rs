@@ -17,6 +17,7 @@ use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
 use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
+use super::noise::in_time::{FIXED_PATTERN, pattern_px2};
 use super::noise::scatter::ScatterResult;
 use super::noise::texture_finding::TextureFinding;
 use super::options::Ablation;
@@ -208,9 +209,12 @@ impl Case<'_> {
         let textures = textures.map(told).chain(self.overstated(scatter));
         let mut found: Vec<Finding> = textures.chain(steps).collect();
         // Lines that stand still have no name, but they are learnt.
+        let has_pattern = scatter.textures.iter().any(|t| t.families.contains(&FIXED_PATTERN));
+        let pattern_px2 = if has_pattern { pattern_px2(&scatter.structure) } else { 0.0 };
         for f in found.iter_mut().filter(|f| are_lines(f)) {
             let axis = f.axis;
-            mean.lines.iter().filter(|l| l.axis == axis).for_each(|l| l.tell(f));
+            let lines = mean.lines.iter().filter(|l| l.axis == axis);
+            lines.for_each(|l| l.tell(f, pattern_px2));
         }
         found
     }

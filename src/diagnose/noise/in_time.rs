@@ -15,8 +15,6 @@ const MIN_FIXED: f64 = 0.0003;
 const DOUBTFUL: f64 = 0.05;
 /// A share that stands still beside one that changes slowly is known to this.
 const BESIDE_ANOTHER: f64 = 0.05;
-/// Of a view that is hardly anything else, px^2 by px^2, nothing is known beside the pattern.
-const LARGEST_PATTERN: f64 = 0.95;
 
 /// A correlation of frames: a share of the variance.
 fn of_frames(
@@ -48,11 +46,20 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
         min_share: MIN_FIXED,
         words: None,
     };
-    let mut found: Vec<TextureFinding> =
-        fixed.and_then(|m| pattern.found(&m, variance, level)).into_iter().collect();
+    let found = fixed.and_then(|m| pattern.found(&m, variance, level));
+    let mut found: Vec<TextureFinding> = found.map(|f| of_pixels(f, views)).into_iter().collect();
     // What the pattern errs by is in every view's correlation alike.
     let of_pattern = fixed.map_or(0.0, |m| m.std_error * mean_precision(views));
     found.extend(beside(&beside_pattern(views, fixed), of_pattern, known, level));
+    found
+}
+
+/// A pattern's standard deviation errs as that of a sample of its pixels, too: small views lie within large ones.
+fn of_pixels(mut found: TextureFinding, views: &[Structure]) -> TextureFinding {
+    let pixels = ViewMean::common_size(views, |s| s.fixed_pixels);
+    let told = |key: &str| found.parameters["sigma_px"][key].as_f64().unwrap_or(0.0);
+    let (sigma, std_error) = (told("value"), told("std_error"));
+    found.parameters = one("sigma_px", sigma, std_error.hypot(sigma / (2.0 * pixels).sqrt()));
     found
 }
 
@@ -65,8 +72,7 @@ fn beside(
 ) -> Vec<TextureFinding> {
     let mut found = Vec::new();
     let Some(first) = ViewMean::of(views, |s| s.lagged[0]) else { return found };
-    let sure_of = |m: ViewMean| ViewMean { std_error: m.std_error.hypot(of_pattern), ..m };
-    let first = sure_of(first);
+    let first = first.and_error(of_pattern);
     let first_error = first.std_error.max(by_chance(views));
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
@@ -88,7 +94,9 @@ fn beside(
     let slowly = alike && p_falling < level;
     // What stands still is in the last of them whole, and in all of them where none fades.
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
-    let Some(standing) = ViewMean::of(views, last).map(sure_of) else { return found };
+    let Some(standing) = ViewMean::of(views, last).map(|m| m.and_error(of_pattern)) else {
+        return found;
+    };
     let p_still = standing.p_above(frozen_known);
     let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
     let stands = p_still < level && still - frozen_known > floor;
@@ -146,12 +154,8 @@ fn by_chance(views: &[Structure]) -> f64 {
 /// Views with their frames' correlations beside a pattern that is the same in all of them: each view's noise
 /// has its own share of that.
 fn beside_pattern(views: &[Structure], fixed: Option<ViewMean>) -> Vec<Structure> {
-    let fixed_px2 = fixed.map_or(0.0, |m| m.value.max(0.0));
-    let beside = |s: &Structure| {
-        let share = (fixed_px2 / s.variance_px2.max(1e-12)).min(LARGEST_PATTERN);
-        let lagged = s.lagged.map(|c| Some((c? - share) / (1.0 - share)));
-        Structure { lagged, ..s.clone() }
-    };
+    let fixed_px2 = fixed.map_or(0.0, |m| m.value);
+    let beside = |s: &Structure| Structure { lagged: s.beside_pattern(fixed_px2), ..s.clone() };
     views.iter().map(beside).collect()
 }
 
@@ -159,6 +163,11 @@ fn beside_pattern(views: &[Structure], fixed: Option<ViewMean>) -> Vec<Structure
 fn mean_precision(views: &[Structure]) -> f64 {
     let precision = |s: &Structure| (s.variance_px2 > 0.0).then(|| 1.0 / s.variance_px2);
     ViewMean::of(views, precision).map_or(0.0, |m| m.value)
+}
+
+/// Variance of what pixels err by in every view alike, px^2.
+pub fn pattern_px2(views: &[Structure]) -> f64 {
+    ViewMean::of_pairs(views, |s| s.fixed_px2).map_or(0.0, |m| m.value)
 }
 
 /// Share of the noise that stands still within a view and is not in all of them, by the views' mean

@@ -20,6 +20,8 @@ pub struct LearntLines {
     pub profile: Term,
     /// Of each coefficient, px^2; nothing of a line that was not seen.
     variances: Vec<f64>,
+    /// Of as many pixels each line is the mean, whatever they err by in every view alike.
+    pixels: Vec<f64>,
 }
 
 impl LearntLines {
@@ -45,16 +47,20 @@ impl LearntLines {
         let (means, variances): (Vec<f64>, Vec<f64>) = lines.unzip();
         let high = nodes.saturating_sub(1) as f64;
         let basis = Basis::Curve { over, low: 0.0, high, nodes, times: Modulation::One };
-        Some(LearntLines { axis, profile: Term::bias(basis, means), variances })
+        let pixels = pixels_of_lines(views, width, nodes, axis);
+        Some(LearntLines { axis, profile: Term::bias(basis, means), variances, pixels })
     }
 
     /// The finding gets the profile, and is as large as that is: the test looks at what changes from one line to
-    /// the next, of which two read-outs have more than columns that err independently.
-    pub fn tell(&self, found: &mut Finding) {
-        let LearntLines { profile, variances, .. } = self;
-        let known = || profile.coefficients.iter().zip(variances).filter(|l| *l.1 > 0.0);
-        let (n, variance) = (known().count() as f64, mean(known().map(|(_, v)| *v)).unwrap_or(0.0));
-        let px2 = mean(known().map(|(c, v)| c * c - v)).unwrap_or(0.0);
+    /// the next, of which two read-outs have more than columns that err independently. A pattern of pixels, of
+    /// `pattern_px2`, has means of its own in each line.
+    pub fn tell(&self, found: &mut Finding, pattern_px2: f64) {
+        let LearntLines { profile, variances, pixels, .. } = self;
+        let by_chance = variances.iter().zip(pixels).map(|(v, n)| (v, pattern_px2 / n.max(1.0)));
+        let known = || profile.coefficients.iter().zip(by_chance.clone()).filter(|l| *l.1.0 > 0.0);
+        let n = known().count() as f64;
+        let variance = mean(known().map(|(_, (v, of_pattern))| v + of_pattern)).unwrap_or(0.0);
+        let px2 = mean(known().map(|(c, (v, of_pattern))| c * c - v - of_pattern)).unwrap_or(0.0);
         if let Some(told) = found.value("sigma_px").filter(|told| px2 > 0.0 && *told > 0.0) {
             let sigma_px = px2.sqrt();
             let error = (variance / n * (1.0 + 0.5 * variance / px2)).sqrt();
@@ -87,6 +93,20 @@ fn with_own_share(means: &[f32]) -> Vec<f32> {
         lines.for_each(|((value, passed), m)| *value += m - passed);
     }
     values
+}
+
+/// Of how many pixels each line is the mean: those of some views count for less.
+fn pixels_of_lines(views: &[(&Field, &[f32])], width: usize, lines: usize, axis: Axis) -> Vec<f64> {
+    let mut seen: Vec<f32> = Vec::new();
+    for (field, _) in views {
+        let image = field.image(&field.mean);
+        seen.resize(seen.len().max(image.len()), 0.0);
+        seen.iter_mut().zip(image).for_each(|(n, r)| *n += f32::from(r.is_finite()));
+    }
+    let squares: Vec<f32> = seen.iter().map(|n| n * n).collect();
+    let [sums, squares] = [seen, squares].map(|image| line_sums(&image, width, axis));
+    let of = |((sum, _), (square, _)): (&(f64, f64), &(f64, f64))| sum * sum / square.max(1.0);
+    sums.iter().zip(&squares).map(of).take(lines).collect()
 }
 
 /// Mean of a line, and its variance with the views as the sample; nothing of too few readings.

@@ -29,7 +29,7 @@ use crate::terms::{Axis, Statistic};
 use frame_means::{frame_means, jitter_px2};
 use frame_tilts::frame_tilts;
 use frames::{flicker, unequal};
-use in_time::{FIXED_PATTERN, in_time};
+use in_time::{FIXED_PATTERN, in_time, pattern_px2};
 use pairs::{REACH_PX, window_of};
 use some_views::some_views;
 use structure::Structure;
@@ -93,31 +93,32 @@ fn textures_of_some(
     level: f64,
     found: &[TextureFinding],
 ) -> Vec<TextureFinding> {
-    type OfView = fn(&Structure) -> Option<f64>;
-    type Error = fn(&Structure) -> f64;
+    type OfView<'a> = &'a dyn Fn(&Structure) -> Option<f64>;
+    type Error<'a> = &'a dyn Fn(&Structure) -> f64;
     type OfAll = fn(&[Structure], &KnownTerms, f64) -> Vec<TextureFinding>;
-    // Shares of a view's own variance, so that near and far views scatter alike.
-    let all: [(&[&str], OfView, Error, OfAll); 3] = [
-        (&[ROW_NOISE], |s| Some(s.row_px2? / s.variance_px2), |s| s.line_error(0), lines),
-        // Rounding stands still: where it hides what neighbours share, frames are alike too.
-        (
-            &["frozen-noise", "temporal-correlation"],
-            |s| s.neighbour_correlation.and(s.lagged[0]),
-            Structure::lagged_error,
-            in_time,
-        ),
-        (
-            &["spatial-correlation"],
-            |s| s.neighbour_correlation,
-            Structure::neighbour_error,
-            |views, known, level| window(views, known, level).into_iter().collect(),
-        ),
-    ];
     // About what a model has of it views need not scatter to both sides alike.
     let told = |ids: &[&str]| {
         let found = found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
         found || ids.iter().any(|id| known.has(id))
     };
+    let beside = if told(&[FIXED_PATTERN]) { pattern_px2(views) } else { 0.0 };
+    // Shares of a view's own variance, so that near and far views scatter alike.
+    let all: [(&[&str], OfView, Error, OfAll); 3] = [
+        (&[ROW_NOISE], &|s| Some(s.row_px2? / s.variance_px2), &|s| s.line_error(0), lines),
+        // Rounding stands still: where it hides what neighbours share, frames are alike too.
+        (
+            &["frozen-noise", "temporal-correlation"],
+            &|s| s.neighbour_correlation.and(s.beside_pattern(beside)[0]),
+            &|s| s.lagged_error(beside),
+            in_time,
+        ),
+        (
+            &["spatial-correlation"],
+            &|s| s.neighbour_correlation,
+            &Structure::neighbour_error,
+            |views, known, level| window(views, known, level).into_iter().collect(),
+        ),
+    ];
     let of = |(ids, of_view, error, of_all): (&[&str], OfView, Error, OfAll)| {
         // The second test of each at this level.
         let some = some_views(views, of_view, Some(error)).filter(|some| 2.0 * some.p < level)?;
@@ -208,25 +209,30 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
     };
     let afresh = "each column is shifted as one, afresh in every frame";
     let row = known_px * known_px;
-    let still = |of: fn(&Structure) -> Option<f64>, axis, words| {
+    let still = |of: fn(&Structure) -> Option<f64>, by_pattern: usize, axis, words| {
         let known_px2 = known.error_of_lines_px2(axis);
         let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
+        let by_pattern = ViewMean::of(views, |s| Some(s.by_pattern_px2[by_pattern]));
+        let by_pattern = by_pattern.map_or(0.0, |m| m.value);
         // Columns, rows and blotches have one error rate.
-        (ViewMean::of_pairs(views, of), line, 3.0)
+        (ViewMean::of_pairs(views, of).map(|m| m.and_error(by_pattern)), line, 3.0)
     };
     let all = [
         still(
             |s| s.lines_px2[0],
+            0,
             Axis::Column,
             "each column has a constant error of its own, unlike its neighbours'",
         ),
         still(
             |s| s.lines_px2[1],
+            1,
             Axis::Row,
             "each row has a constant error of its own, unlike its neighbours'",
         ),
         still(
             |s| s.blotches_px2,
+            2,
             Axis::Pixel,
             "a fine pattern over the picture is the same in all views",
         ),

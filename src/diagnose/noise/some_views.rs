@@ -73,14 +73,14 @@ pub struct Above {
 pub fn some_views(
     views: &[Structure],
     value: impl Fn(&Structure) -> Option<f64>,
-    error: Option<fn(&Structure) -> f64>,
+    error: Option<&dyn Fn(&Structure) -> f64>,
 ) -> Option<Above> {
     let measured = |s: &Structure| Some((value(s).filter(|v| v.is_finite())?, s.pixels));
     let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
     let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
     let weight = Weight::of(&values);
     let off: Vec<f64> = values.iter().map(|(x, size)| weight.at(*size).sqrt() * x).collect();
-    let by_error = |error: fn(&Structure) -> f64| {
+    let by_error = |error: &dyn Fn(&Structure) -> f64| {
         let off: Vec<f64> = values.iter().zip(&which).map(|((x, _), s)| x / error(s)).collect();
         SomeViews::above_error(&off)
     };

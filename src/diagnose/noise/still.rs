@@ -3,37 +3,62 @@
 use rand::Rng;
 use rayon::prelude::*;
 
-use super::texture::{SHORT_LINE, at_two_scales, line_sums, without_lines};
+use super::structure::repeats_of_box;
+use super::texture::{PIXEL_BOX, SHORT_LINE, at_two_scales, line_sums, without_lines};
 use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 use crate::terms::Axis;
 
 /// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share;
 /// of means over a few pixels, the same; of whole columns and of whole rows, as far as they change from one to the
-/// next.
+/// next. Means and lines beyond those of a pattern of independent pixels.
 pub struct Still {
     pub fixed_px2: Option<f64>,
+    /// Of as many pixels as all count alike.
+    pub fixed_pixels: f64,
     pub blotches_px2: Option<f64>,
     pub lines_px2: [Option<f64>; 2],
+    /// Standard errors of columns, rows and blotches in all views alike, px^2: the pattern's own are few.
+    pub by_pattern_px2: [f64; 3],
 }
 
 impl Still {
-    /// As a share of what a pattern of variance 1 keeps; lines beyond the mean of such a pattern's pixels.
-    fn over(&self, kept: &Still) -> Still {
-        let fixed_px2 =
-            self.fixed_px2.zip(kept.fixed_px2.filter(|k| *k > 0.0)).map(|(seen, kept)| seen / kept);
-        let beyond = |seen: Option<f64>, kept: Option<f64>| {
-            let of_pattern = fixed_px2.zip(kept).map_or(0.0, |(px2, kept)| px2 * kept);
-            seen.map(|seen| seen - of_pattern)
+    /// With what a pattern of variance 1 keeps.
+    fn of(
+        [pixels, blotches, lines @ ..]: [Option<Product>; 4],
+        kept: &[Option<Product>; 4],
+    ) -> Self {
+        let fixed = pixels.zip(kept[0].filter(|k| k.px2 > 0.0));
+        let fixed_px2 = fixed.map(|(seen, kept)| seen.px2 / kept.px2);
+        let of_pattern = |kept: Option<Product>| fixed_px2.zip(kept).map(|(px2, k)| px2 * k.px2);
+        let beyond = |seen: Option<Product>, kept| {
+            seen.map(|seen| seen.px2 - of_pattern(kept).unwrap_or(0.0))
         };
-        let lines_px2 = [0, 1].map(|k| beyond(self.lines_px2[k], kept.lines_px2[k]));
-        Still { fixed_px2, blotches_px2: beyond(self.blotches_px2, kept.blotches_px2), lines_px2 }
+        // The coins' own lines are as few as the pattern's.
+        let error = |kept: Option<Product>, repeats: f64| {
+            let relative = kept.map_or(0.0, |k| k.error_px2 * (2.0 * repeats).sqrt());
+            relative * fixed_px2.unwrap_or(0.0).abs()
+        };
+        Still {
+            fixed_px2,
+            fixed_pixels: pixels.map_or(0.0, |seen| seen.n),
+            blotches_px2: beyond(blotches, kept[1]),
+            lines_px2: [0, 1].map(|k| beyond(lines[k], kept[2 + k])),
+            by_pattern_px2: [
+                error(kept[2], SHARP_REPEATS),
+                error(kept[3], SHARP_REPEATS),
+                error(kept[1], repeats_of_box(PIXEL_BOX as f64)),
+            ],
+        }
     }
 }
 
+/// Sum over all lags of the squared correlation of [`sharp_lines`]: 1, -2/3 and 1/6.
+const SHARP_REPEATS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
+
 /// What a pattern of variance 1 keeps in each view where it is measured: every pixel is part of the means that
 /// are taken out.
-pub struct KeptPattern(Vec<Still>);
+pub struct KeptPattern(Vec<[Option<Product>; 4]>);
 
 impl KeptPattern {
     pub fn of(fields: &[Field]) -> Self {
@@ -53,13 +78,24 @@ pub fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Fi
 pub fn still(views: &[(&Field, &[f32])], kept: &KeptPattern) -> Vec<Still> {
     debug_assert_eq!(views.len(), kept.0.len());
     let seen = covariances(views, |f, b| at_two_scales(f, &f.mean, b));
-    seen.iter().zip(&kept.0).map(|(seen, kept)| seen.over(kept)).collect()
+    seen.into_iter().zip(&kept.0).map(|(seen, kept)| Still::of(seen, kept)).collect()
 }
 
+/// Mean product of one view's values with the other views', px^2.
+#[derive(Debug, Clone, Copy)]
+struct Product {
+    px2: f64,
+    /// Of as many values that all count alike.
+    n: f64,
+    /// Standard error, by the products' scatter.
+    error_px2: f64,
+}
+
+/// Of pixels, means over a few, columns and rows.
 fn covariances(
     views: &[(&Field, &[f32])],
     images: impl Fn(&Field, &[f32]) -> [Vec<f32>; 2] + Sync,
-) -> Vec<Still> {
+) -> Vec<[Option<Product>; 4]> {
     let of_view = |(f, b): &(&Field, &[f32])| {
         let images = images(f, b);
         let [columns, rows] = sharp_lines(&images[0], f.width);
@@ -72,12 +108,7 @@ fn covariances(
     };
     let [pixels, blotches] = [0, 1].map(|k| of(k, MIN_PAIRS[0]));
     let [columns, rows] = [2, 3].map(|k| of(k, MIN_PAIRS[1]));
-    let still = |v: usize| Still {
-        fixed_px2: pixels[v],
-        blotches_px2: blotches[v],
-        lines_px2: [columns[v], rows[v]],
-    };
-    (0..views.len()).map(still).collect()
+    (0..views.len()).map(|v| [pixels[v], blotches[v], columns[v], rows[v]]).collect()
 }
 
 /// Of fewer pixels, and of fewer lines, that another view saw as well nothing is told.
@@ -107,8 +138,8 @@ fn tossed(field: &Field, coins: &[f32]) -> Vec<f32> {
     pixels.map(|(&i, mean)| if mean.is_finite() { coins[i as usize] } else { f32::NAN }).collect()
 }
 
-/// Mean product of each view's values with the mean of the others', px^2.
-fn across_views(means: &[&[f32]], min_pairs: f64) -> Vec<Option<f64>> {
+/// Of each view's values with the mean of the others'.
+fn across_views(means: &[&[f32]], min_pairs: f64) -> Vec<Option<Product>> {
     let n = means.iter().map(|image| image.len()).max().unwrap_or(0);
     let mut sum = vec![0f32; n];
     let mut count = vec![0u16; n];
@@ -121,16 +152,23 @@ fn across_views(means: &[&[f32]], min_pairs: f64) -> Vec<Option<f64>> {
         }
     }
     let of = |image: &&[f32]| {
-        let (mut products, mut n) = (0.0, 0.0);
+        // Pixels that many views saw say more.
+        let (mut products, mut squares) = (0.0, 0.0);
+        let (mut pairs, mut squared, mut both) = (0.0, 0.0, 0.0);
         for ((&s, &c), &r) in sum.iter().zip(&count).zip(*image) {
             if r.is_finite() && c > 1 {
-                // Pixels that many views saw say more.
-                let others = f64::from(c - 1);
-                products += f64::from(r) * f64::from(s - r);
-                n += others;
+                let (product, others) = (f64::from(r) * f64::from(s - r), f64::from(c - 1));
+                products += product;
+                squares += product * product;
+                pairs += others;
+                squared += others * others;
+                both += product * others;
             }
         }
-        (n > min_pairs).then(|| products / n)
+        let px2 = products / pairs;
+        let off = squares - px2 * (2.0 * both - px2 * squared);
+        let error_px2 = off.max(0.0).sqrt() / pairs;
+        (pairs > min_pairs).then_some(Product { px2, n: pairs * pairs / squared, error_px2 })
     };
     means.par_iter().map(of).collect()
 }

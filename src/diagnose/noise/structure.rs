@@ -39,10 +39,14 @@ pub struct Structure {
     pub frame_pixels: f64,
     /// Covariance of the mean residual with the other views' at the same pixels, px^2.
     pub fixed_px2: Option<f64>,
+    /// Of as many pixels as all count alike.
+    pub fixed_pixels: f64,
     /// The same of means over a few pixels, px^2.
     pub blotches_px2: Option<f64>,
     /// The same of whole columns and rows, as far as it changes from one to the next, px^2.
     pub lines_px2: [Option<f64>; 2],
+    /// What columns, rows and those means err by in all views alike, px^2, beside a pattern of pixels.
+    pub by_pattern_px2: [f64; 3],
     /// Variance that a row (a column) of one frame shares, px^2.
     pub row_px2: Option<f64>,
     pub column_px2: Option<f64>,
@@ -78,8 +82,7 @@ impl Structure {
 
     /// Pixels that a square of the noise is shared by: the squared correlation of a box sums to this.
     pub fn repeats(&self) -> f64 {
-        let side = self.window_px.unwrap_or(1.0).max(1.0);
-        ((2.0 * side * side + 1.0) / (3.0 * side)).powi(2)
+        repeats_of_box(self.window_px.unwrap_or(1.0).max(1.0))
     }
 
     /// Skewness of the disparity, and of the depth: of noise of s times the disparity 6 s less.
@@ -103,10 +106,25 @@ impl Structure {
         (self.line_error(axis) * self.variance_px2.max(variance_px2).max(1e-12)).powi(-2)
     }
 
-    /// What the correlation of frames errs by where they have nothing in common.
-    pub fn lagged_error(&self) -> f64 {
+    /// What the correlation of frames errs by where they have nothing in common beside a pattern of this variance,
+    /// which is by chance larger or smaller at a view's pixels.
+    pub fn lagged_error(&self, pattern_px2: f64) -> f64 {
         let changes = self.lagged.iter().flatten().count() as f64;
-        (self.repeats() / (self.pixels * changes)).sqrt()
+        let (share, left) = self.pattern_share(pattern_px2);
+        let of_pattern = share / left * (2.0 / self.pixels).sqrt();
+        (self.repeats() / (self.pixels * changes)).sqrt().hypot(of_pattern)
+    }
+
+    /// Correlation of a pixel with itself 1, 2 and 3 frames later of what is left beside a pattern of this variance.
+    pub fn beside_pattern(&self, pattern_px2: f64) -> [Option<f64>; 3] {
+        let (share, left) = self.pattern_share(pattern_px2);
+        self.lagged.map(|c| Some((c? - share) / left))
+    }
+
+    /// A pattern's share of the variance, and what is left.
+    fn pattern_share(&self, pattern_px2: f64) -> (f64, f64) {
+        let share = (pattern_px2.max(0.0) / self.variance_px2.max(1e-12)).min(LARGEST_PATTERN);
+        (share, 1.0 - share)
     }
 
     /// What the correlation of neighbours errs by at most where they have nothing in common: as from one change.
@@ -149,13 +167,22 @@ impl Structure {
     }
 }
 
+/// Of a view that is hardly anything else, px^2 by px^2, nothing is known beside the pattern.
+const LARGEST_PATTERN: f64 = 0.95;
+
+/// Of means over a square of white pixels, the squared correlation summed over all lags.
+pub fn repeats_of_box(side: f64) -> f64 {
+    ((2.0 * side * side + 1.0) / (3.0 * side)).powi(2)
+}
+
 /// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
 pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Vec<Structure> {
     let views = beside_bias(fields, bias);
     let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, b)).collect();
     for (s, still) in all.iter_mut().zip(still(&views, kept)) {
-        (s.fixed_px2, s.blotches_px2) = (still.fixed_px2, still.blotches_px2);
-        s.lines_px2 = still.lines_px2;
+        (s.fixed_px2, s.fixed_pixels) = (still.fixed_px2, still.fixed_pixels);
+        s.blotches_px2 = still.blotches_px2;
+        (s.lines_px2, s.by_pattern_px2) = (still.lines_px2, still.by_pattern_px2);
     }
     all
 }

@@ -54,6 +54,17 @@ impl ViewMean {
         Some(ViewMean { value, std_error, views: weighted.len() as f64 })
     }
 
+    /// Of how many pixels a mean over the views is, each of so many that lie within those of all that have more.
+    pub fn common_size(views: &[Structure], pixels: impl Fn(&Structure) -> f64) -> f64 {
+        let values: Vec<(f64, f64)> = views.iter().map(|s| (pixels(s), s.pixels)).collect();
+        let weighted = Weight::of(&values).each(&values);
+        let total: f64 = weighted.iter().map(|v| v.1).sum();
+        let shared = weighted.iter().flat_map(|(a, at)| {
+            weighted.iter().map(move |(b, weight)| at * weight / a.max(*b).max(1.0))
+        });
+        total * total / shared.sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
     /// Nats by which the `value` of one more view, of this size, is likelier about the mean of these values than
     /// about none: by Student's t of their scatter.
     pub fn predicts(values: &[(f64, f64)], (value, size): (f64, f64)) -> Option<f64> {
@@ -67,6 +78,11 @@ impl ViewMean {
         };
         let nats = log(value - m.value, own + of_mean) - log(value, own);
         nats.is_finite().then_some(nats)
+    }
+
+    /// The same that errs by so much in all views alike, too.
+    pub fn and_error(self, common: f64) -> Self {
+        ViewMean { std_error: self.std_error.hypot(common), ..self }
     }
 
     /// Chance of a mean this far above `expected`, one-sided, by Student's t.
