@@ -22,19 +22,8 @@ impl Correction {
     /// depth becomes infinite where the errors leave no disparity.
     /// An error when the image is not of the sensor's size.
     pub fn apply(&self, depth_m: &mut [f32], conditions: &Conditions) -> Result<()> {
-        self.refuse_size(depth_m)?;
-        if self.is_identity() {
-            return Ok(());
-        }
-        let known = self.known(depth_m, conditions);
-        let width = self.camera.width;
-        depth_m.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            for (u, z) in line.iter_mut().enumerate() {
-                if *z > 0.0 {
-                    *z = self.depth(row * width + u, *z, &known) as f32;
-                }
-            }
-        });
+        let corrected = self.corrected(depth_m, conditions)?;
+        depth_m.iter_mut().zip(corrected).for_each(|(z, corrected)| *z = corrected as f32);
         Ok(())
     }
 
@@ -50,7 +39,7 @@ impl Correction {
             true => self.depth(i, z, &known),
             false => f64::from(z),
         };
-        Ok(depth_m.iter().enumerate().map(one).collect())
+        Ok(depth_m.par_iter().enumerate().map(one).collect())
     }
 
     pub(super) fn refuse_size(&self, depth_m: &[f32]) -> Result<()> {
@@ -116,21 +105,17 @@ impl Correction {
         let tilt = self.uncertainty.needs.tilt;
         let (terms, columns) = (Vec::new(), Vec::new());
         let known = Known { conditions, factor: 1.0, slopes, pixels, terms, columns, tilt };
-        let width = self.camera.width;
-        let mut sigma = vec![f32::NAN; depth_m.len()];
-        sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            let mut parts = Vec::new();
-            for (u, sigma) in line.iter_mut().enumerate() {
-                let z = f64::from(depth_m[row * width + u]);
-                if z > 0.0 && z.is_finite() {
-                    let mut place = known.place(row * width + u);
-                    known.stand(&mut place, row * width + u, self.scale_px_m / z);
-                    let px = self.uncertainty.variance(&place, &mut parts).sqrt();
-                    *sigma = (px * z * z / self.scale_px_m) as f32;
-                }
+        let sigma = |parts: &mut Vec<f64>, (i, &z): (usize, &f32)| {
+            let z = f64::from(z);
+            if !(z > 0.0 && z.is_finite()) {
+                return f32::NAN;
             }
-        });
-        sigma
+            let mut place = known.place(i);
+            known.stand(&mut place, i, self.scale_px_m / z);
+            let px = self.uncertainty.variance(&place, parts).sqrt();
+            (px * z * z / self.scale_px_m) as f32
+        };
+        depth_m.par_iter().enumerate().map_init(Vec::new, sigma).collect()
     }
 
     /// Standard deviation of each stored depth, m, as the model predicts it: sigma at the corrected
@@ -144,24 +129,19 @@ impl Correction {
         known.slopes = slopes.or_else(|| Some(self.slopes(depth_m, known.factor)));
         known.tilt = true;
         let variance = || self.variance.iter().filter(|(t, _)| conditions.determine(t));
-        let width = self.camera.width;
-        let mut sigma = vec![f64::NAN; depth_m.len()];
-        sigma.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            for (u, sigma) in line.iter_mut().enumerate() {
-                let (i, z) = (row * width + u, depth_m[row * width + u]);
-                let depth = if z > 0.0 { self.depth(i, z, &known) } else { 0.0 };
-                if !(depth > 0.0 && depth.is_finite()) {
-                    continue;
-                }
-                let mut place = known.place(i);
-                known.stand(&mut place, i, self.scale_px_m / depth);
-                let plain = self.sigma.axial_sigma(depth, place.theta);
-                place.variance = (plain * place.disparity / depth).powi(2);
-                let terms = variance().map(|t| held(t, &place));
-                *sigma = plain * (0.5 * terms.sum::<f64>()).exp();
+        let sigma = |(i, &z): (usize, &f32)| {
+            let depth = if z > 0.0 { self.depth(i, z, &known) } else { 0.0 };
+            if !(depth > 0.0 && depth.is_finite()) {
+                return f64::NAN;
             }
-        });
-        Ok(sigma)
+            let mut place = known.place(i);
+            known.stand(&mut place, i, self.scale_px_m / depth);
+            let plain = self.sigma.axial_sigma(depth, place.theta);
+            place.variance = (plain * place.disparity / depth).powi(2);
+            let terms = variance().map(|t| held(t, &place));
+            plain * (0.5 * terms.sum::<f64>()).exp()
+        };
+        Ok(depth_m.par_iter().enumerate().map(sigma).collect())
     }
 
     /// What whole columns err by in this image, px, where the model says that they do and the image shows how.

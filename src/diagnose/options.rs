@@ -44,6 +44,9 @@ pub const MIN_VIEWS: usize = 3;
 /// Single frames kept whole: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 
+/// Standard deviations that 80 % of a Gaussian lie above, below its mean.
+pub const POWER_80: f64 = 0.84;
+
 pub fn measure_options(options: &DiagnoseOptions) -> MeasureOptions {
     MeasureOptions { seed: options.seed, ..MeasureOptions::default() }
 }

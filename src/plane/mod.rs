@@ -32,7 +32,7 @@ use nalgebra::{Unit, Vector3};
 use crate::camera::Rays;
 
 /// A plane in front of the camera: 1/z = q . (x, y, 1), q in 1/m.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Plane {
     pub q: Vector3<f64>,
 }

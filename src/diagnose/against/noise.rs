@@ -43,7 +43,7 @@ impl View {
     fn of(real: &Structure, twin: &Structure) -> Option<Self> {
         let parts = |s: &Structure| {
             // What stands still in every view is a pattern of the sensor's.
-            let fixed = s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+            let fixed = s.still.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
             let all = of_any_two(s).filter(|c| (MIN_PART..1.0 - MIN_PART).contains(c))?;
             let still = Some(all - fixed).filter(|still| *still > MIN_PART)?;
             Some([still * s.variance_px2, (1.0 - all) * s.variance_px2])

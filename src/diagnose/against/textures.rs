@@ -28,7 +28,7 @@ impl Baseline {
             mean(self.structure.iter().filter_map(of)).unwrap_or(0.0)
         };
         let windows = level(&|s| s.window_px.map(f64::ln));
-        let (fixed, rows) = (level(&|s| s.fixed_px2), level(&|s| s.row_px2));
+        let (fixed, rows) = (level(&|s| s.still.fixed_px2), level(&|s| s.row_px2));
         let columns = level(&|s| s.column_px2);
         let lags: [f64; 3] = std::array::from_fn(|k| level(&|s| s.lagged[k]));
         for (s, twin) in ours.iter_mut().zip(&self.structure) {
@@ -36,12 +36,12 @@ impl Baseline {
                 *real = real.zip(twin).map(|(r, t)| r - t + level);
             };
             s.window_px = s.window_px.zip(twin.window_px).map(|(r, t)| r / t * windows.exp());
-            differ(&mut s.fixed_px2, twin.fixed_px2, fixed.max(0.0));
+            differ(&mut s.still.fixed_px2, twin.still.fixed_px2, fixed.max(0.0));
             differ(&mut s.row_px2, twin.row_px2, rows.max(0.0));
             // Nothing is known of columns: what both have must vanish.
             differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
-            differ(&mut s.blotches_px2, twin.blotches_px2, 0.0);
-            for (real, twin) in s.lines_px2.iter_mut().zip(twin.lines_px2) {
+            differ(&mut s.still.blotches_px2, twin.still.blotches_px2, 0.0);
+            for (real, twin) in s.still.lines_px2.iter_mut().zip(twin.still.lines_px2) {
                 differ(real, twin, 0.0);
             }
             s.frame_log_variance

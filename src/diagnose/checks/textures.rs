@@ -99,10 +99,10 @@ fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfV
         }
         (Some("target-motion"), ..) => Box::new(|s| Some(s.jitter?.velocity_mps)),
         (Some(id), ..) => return beyond(id, known),
-        (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.lines_px2[0]),
-        (None, Axis::Row, Statistic::Bias) => Box::new(|s| s.lines_px2[1]),
+        (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.still.lines_px2[0]),
+        (None, Axis::Row, Statistic::Bias) => Box::new(|s| s.still.lines_px2[1]),
         (None, Axis::Residual, _) => Box::new(|s| Some(s.skewness()?[0])),
-        (None, Axis::Pixel, _) => Box::new(|s| s.blotches_px2),
+        (None, Axis::Pixel, _) => Box::new(|s| s.still.blotches_px2),
         (None, Axis::Column, _) => Box::new(|s| s.column_px2),
         (None, Axis::Frame, Statistic::Correlation) => Box::new(|s| Some(s.tilts?.beyond())),
         (None, Axis::Frame, _) => {
@@ -118,13 +118,14 @@ pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
     let parameter = |name: &str| known.parameter(id, name).unwrap_or(0.0);
     let (px2, fraction, rho) =
         (parameter("sigma_px").powi(2), parameter("fraction"), parameter("rho"));
-    let still = |s: &Structure| s.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+    let still =
+        |s: &Structure| s.still.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
     Some(match id {
         "spatial-correlation" => {
             let side = expected_window(known);
             Box::new(move |s| Some(s.window_px?.ln() - side.ln()))
         }
-        "fixed-pattern-noise" => Box::new(move |s| Some(s.fixed_px2? - px2)),
+        "fixed-pattern-noise" => Box::new(move |s| Some(s.still.fixed_px2? - px2)),
         "temporal-correlation" => Box::new(move |s| Some(s.lagged[0]? - rho)),
         "frozen-noise" => Box::new(move |s| Some(of_any_two(s)? - still(s) - fraction)),
         "row-noise" => Box::new(move |s| Some(s.row_px2? - px2)),

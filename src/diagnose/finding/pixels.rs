@@ -39,7 +39,7 @@ pub(in crate::diagnose) fn common(
 
 /// Variance of the pixels' constant errors, px^2.
 pub(in crate::diagnose) fn fixed_px2(structure: &[Structure]) -> f64 {
-    mean_of(structure.iter().filter_map(|s| s.fixed_px2))
+    mean_of(structure.iter().filter_map(|s| s.still.fixed_px2))
 }
 
 pub(in crate::diagnose) fn mean_of(values: impl Iterator<Item = f64>) -> f64 {

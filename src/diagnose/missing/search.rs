@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::cells::{Cell, Scatter, USUAL, Whitener, odds, share};
 use super::shapes::{Shape, Step, begun};
 use crate::diagnose::checks::replication::Halves;
+use crate::diagnose::options::POWER_80;
 use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::Null;
@@ -271,7 +272,6 @@ impl<'a> Losses<'a> {
     /// The farthest (for what is lost below: the nearest) whole step that is seen with 80 % power.
     pub fn detectable(&self, steps: &[Step], threshold: f64) -> Vec<Step> {
         // A gain of half the information, give or take its root.
-        const POWER_80: f64 = 0.84;
         let seen = |s: &&Step| {
             let a: f64 = self.column(**s).a.iter().sum();
             s.share == 1.0 && !s.incidence && 0.5 * a - POWER_80 * a.sqrt() > threshold

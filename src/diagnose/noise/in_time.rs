@@ -35,7 +35,7 @@ fn of_frames(
 }
 
 pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
-    let fixed = ViewMean::of_pairs(views, |s| s.fixed_px2);
+    let fixed = ViewMean::of_pairs(views, |s| s.still.fixed_px2);
     let variance = variance_px2(views);
     let known_px = known.parameter(FIXED_PATTERN, "sigma_px").unwrap_or(0.0);
     let pattern = Shared {
@@ -56,7 +56,7 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
 
 /// A pattern's standard deviation errs as that of a sample of its pixels, too: small views lie within large ones.
 fn of_pixels(mut found: TextureFinding, views: &[Structure]) -> TextureFinding {
-    let pixels = ViewMean::common_size(views, |s| s.fixed_pixels);
+    let pixels = ViewMean::common_size(views, |s| s.still.fixed_pixels);
     let told = |key: &str| found.parameters["sigma_px"][key].as_f64().unwrap_or(0.0);
     let (sigma, std_error) = (told("value"), told("std_error"));
     found.parameters = one("sigma_px", sigma, std_error.hypot(sigma / (2.0 * pixels).sqrt()));
@@ -167,13 +167,13 @@ fn mean_precision(views: &[Structure]) -> f64 {
 
 /// Variance of what pixels err by in every view alike, px^2.
 pub fn pattern_px2(views: &[Structure]) -> f64 {
-    ViewMean::of_pairs(views, |s| s.fixed_px2).map_or(0.0, |m| m.value)
+    ViewMean::of_pairs(views, |s| s.still.fixed_px2).map_or(0.0, |m| m.value)
 }
 
 /// Share of the noise that stands still within a view and is not in all of them, by the views' mean
 /// correlations; `None` with too few frames.
 pub fn still_level(views: &[Structure]) -> Option<f64> {
-    still_beside(&beside_pattern(views, ViewMean::of_pairs(views, |s| s.fixed_px2)))
+    still_beside(&beside_pattern(views, ViewMean::of_pairs(views, |s| s.still.fixed_px2)))
 }
 
 fn still_beside(views: &[Structure]) -> Option<f64> {
@@ -238,7 +238,7 @@ mod tests {
             let views = with(&mut rng, |s| {
                 noise_px2 *= 1.3;
                 s.variance_px2 = noise_px2 + PATTERN_PX2;
-                s.fixed_px2 = s.fixed_px2.map(|f| f + PATTERN_PX2);
+                s.still.fixed_px2 = s.still.fixed_px2.map(|f| f + PATTERN_PX2);
                 let still = (FRACTION * noise_px2 + PATTERN_PX2) / s.variance_px2;
                 s.lagged = s.lagged.map(|c| c.map(|c| c + still));
             });

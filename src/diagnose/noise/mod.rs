@@ -212,26 +212,26 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
     let still = |of: fn(&Structure) -> Option<f64>, by_pattern: usize, axis, words| {
         let known_px2 = known.error_of_lines_px2(axis);
         let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
-        let by_pattern = ViewMean::of(views, |s| Some(s.by_pattern_px2[by_pattern]));
+        let by_pattern = ViewMean::of(views, |s| Some(s.still.by_pattern_px2[by_pattern]));
         let by_pattern = by_pattern.map_or(0.0, |m| m.value);
         // Columns, rows and blotches have one error rate.
         (ViewMean::of_pairs(views, of).map(|m| m.and_error(by_pattern)), line, 3.0)
     };
     let all = [
         still(
-            |s| s.lines_px2[0],
+            |s| s.still.lines_px2[0],
             0,
             Axis::Column,
             "each column has a constant error of its own, unlike its neighbours'",
         ),
         still(
-            |s| s.lines_px2[1],
+            |s| s.still.lines_px2[1],
             1,
             Axis::Row,
             "each row has a constant error of its own, unlike its neighbours'",
         ),
         still(
-            |s| s.blotches_px2,
+            |s| s.still.blotches_px2,
             2,
             Axis::Pixel,
             "a fine pattern over the picture is the same in all views",

@@ -3,8 +3,8 @@
 use rand::Rng;
 use rayon::prelude::*;
 
-use super::structure::repeats_of_box;
 use super::texture::{PIXEL_BOX, SHORT_LINE, at_two_scales, line_sums, without_lines};
+use crate::diagnose::views::box_sums::repeats_of_box;
 use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 use crate::terms::Axis;
@@ -12,6 +12,7 @@ use crate::terms::Axis;
 /// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share;
 /// of means over a few pixels, the same; of whole columns and of whole rows, as far as they change from one to the
 /// next. Means and lines beyond those of a pattern of independent pixels.
+#[derive(Debug, Clone, Default)]
 pub struct Still {
     pub fixed_px2: Option<f64>,
     /// Of as many pixels as all count alike.
@@ -176,19 +177,23 @@ fn across_views(means: &[&[f32]], min_pairs: f64) -> Vec<Option<Product>> {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
+    use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::diagnose::noise::structure::Structure;
+    use crate::diagnose::noise::view_mean::ViewMean;
     use crate::plane::Plane;
     use crate::simulate::kinect_v1;
 
     const PATTERN_PX: f64 = 0.01;
 
-    /// Without noise, on targets of very different sizes, with this error at each pixel: what pixels, columns,
-    /// rows and means over a few pixels have in common, over the error's variance.
-    fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 4]> {
+    const SIDES: [usize; 6] = [36, 48, 60, 100, 160, 220];
+
+    /// What is measured without noise, on targets of very different sizes, with this error at each pixel.
+    fn measured(pattern: impl Fn(usize) -> f64) -> Vec<Still> {
         let camera = kinect_v1(1).camera;
         let (width, height) = (camera.width, camera.height);
-        let fields: Vec<Field> = [36, 48, 60, 100, 160, 220]
+        let fields: Vec<Field> = SIDES
             .map(|side| {
                 let at = |i: &usize| {
                     let (u, v) =
@@ -202,11 +207,14 @@ mod tests {
                 field
             })
             .into();
-        let kept = KeptPattern::of(&fields);
+        still(&beside_bias(&fields, &[]), &KeptPattern::of(&fields))
+    }
+
+    /// The same: what pixels, columns, rows and means over a few pixels have in common, over the error's variance.
+    fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 4]> {
         let all = |s: &Still| [s.fixed_px2, s.lines_px2[0], s.lines_px2[1], s.blotches_px2];
         let of_view = |s: &Still| all(s).map(|px2| px2.expect("large enough"));
-        let seen = still(&beside_bias(&fields, &[]), &kept);
-        seen.iter().map(|s| of_view(s).map(|px2| px2 / PATTERN_PX.powi(2))).collect()
+        measured(pattern).iter().map(|s| of_view(s).map(|px2| px2 / PATTERN_PX.powi(2))).collect()
     }
 
     /// Of the variance of pixels up or down the means that are taken out take 4 to 9 % (numpy), and lines
@@ -225,6 +233,57 @@ mod tests {
         }
         let mean = seen.iter().map(|s| s[0]).sum::<f64>() / seen.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
+    }
+
+    /// Of 60 patterns that are drawn afresh: the scatter of a pattern's variance, and of what its lines and its means
+    /// over a few pixels have in common, is as said. Of that of the lines half is the coins', the same for all.
+    #[test]
+    fn a_pattern_is_a_sample_of_its_pixels() {
+        const PATTERNS: usize = 60;
+        let mut rng = Seed(6).stream("still/sample");
+        let size = kinect_v1(1).camera;
+        let (mut pixels, mut off, mut said) = (0.0, [0.0; 4], [0.0; 3]);
+        for _ in 0..PATTERNS {
+            let draw = |_| {
+                PATTERN_PX * {
+                    let x: f64 = StandardNormal.sample(&mut rng);
+                    x
+                }
+            };
+            let pattern: Vec<f64> = (0..size.width * size.height).map(draw).collect();
+            let views: Vec<Structure> = measured(|i| pattern[i])
+                .into_iter()
+                .zip(SIDES)
+                .map(|(still, side)| Structure {
+                    pixels: (side * side) as f64,
+                    still,
+                    ..Structure::default()
+                })
+                .collect();
+            pixels = ViewMean::common_size(&views, |s| s.still.fixed_pixels);
+            let mean = |of: &dyn Fn(&Structure) -> f64| {
+                ViewMean::of(&views, |s| Some(of(s) / PATTERN_PX.powi(2))).expect("views").value
+            };
+            let shared = |k: usize| {
+                move |s: &Structure| {
+                    [s.still.lines_px2[0], s.still.lines_px2[1], s.still.blotches_px2][k]
+                        .expect("large enough")
+                }
+            };
+            off[3] += (mean(&|s| s.still.fixed_px2.expect("large enough")) - 1.0).powi(2);
+            for k in 0..3 {
+                off[k] += mean(&shared(k)).powi(2);
+                said[k] += mean(&|s| s.still.by_pattern_px2[k]);
+            }
+        }
+        let rms = off.map(|square| (square / PATTERNS as f64).sqrt());
+        // A scatter by 60 errs by a tenth.
+        let of_pixels = rms[3] / (2.0 / pixels).sqrt();
+        assert!((0.75..1.3).contains(&of_pixels), "{of_pixels}");
+        for (rms, said) in rms.iter().zip(said) {
+            let ratio = rms / (said / PATTERNS as f64);
+            assert!((0.5..1.3).contains(&ratio), "{ratio}");
+        }
     }
 
     /// A wave across the picture, 16 px from crest to crest along its diagonal: what is left of it by means over 7 px

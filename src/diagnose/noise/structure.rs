@@ -7,13 +7,14 @@ use rayon::prelude::*;
 use super::frame_series::{Jitter, Squares};
 use super::moments::Moments;
 use super::pairs::{NEIGHBOURS, Pairs, REACH_PX};
-use super::still::{KeptPattern, beside_bias, still};
+use super::still::{KeptPattern, Still, beside_bias, still};
 use super::tail_counts::{MIN_READINGS, TailCounts};
 use super::texture::{
     FAR, Filled, PROFILE_LAGS, SHORT_LINE, area, changes, covariance, frame_log_variance,
     high_passed, moving, same_pixel, without_lines, without_outliers,
 };
 use crate::diagnose::options::FRAMES_KEPT;
+use crate::diagnose::views::box_sums::repeats_of_box;
 use crate::diagnose::views::field::Field;
 use crate::stats::{Correlation, LONGEST_LAG, mean};
 
@@ -37,16 +38,8 @@ pub struct Structure {
     pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
     /// Pixels that all of these frames measured.
     pub frame_pixels: f64,
-    /// Covariance of the mean residual with the other views' at the same pixels, px^2.
-    pub fixed_px2: Option<f64>,
-    /// Of as many pixels as all count alike.
-    pub fixed_pixels: f64,
-    /// The same of means over a few pixels, px^2.
-    pub blotches_px2: Option<f64>,
-    /// The same of whole columns and rows, as far as it changes from one to the next, px^2.
-    pub lines_px2: [Option<f64>; 2],
-    /// What columns, rows and those means err by in all views alike, px^2, beside a pattern of pixels.
-    pub by_pattern_px2: [f64; 3],
+    /// What the mean residual has in common with the other views'.
+    pub still: Still,
     /// Variance that a row (a column) of one frame shares, px^2.
     pub row_px2: Option<f64>,
     pub column_px2: Option<f64>,
@@ -170,19 +163,12 @@ impl Structure {
 /// Of a view that is hardly anything else, px^2 by px^2, nothing is known beside the pattern.
 const LARGEST_PATTERN: f64 = 0.95;
 
-/// Of means over a square of white pixels, the squared correlation summed over all lags.
-pub fn repeats_of_box(side: f64) -> f64 {
-    ((2.0 * side * side + 1.0) / (3.0 * side)).powi(2)
-}
-
 /// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
 pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Vec<Structure> {
     let views = beside_bias(fields, bias);
     let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, b)).collect();
     for (s, still) in all.iter_mut().zip(still(&views, kept)) {
-        (s.fixed_px2, s.fixed_pixels) = (still.fixed_px2, still.fixed_pixels);
-        s.blotches_px2 = still.blotches_px2;
-        (s.lines_px2, s.by_pattern_px2) = (still.lines_px2, still.by_pattern_px2);
+        s.still = still;
     }
     all
 }

@@ -8,6 +8,7 @@ use super::*;
 use crate::diagnose::noise::frame_series::Jitter;
 use crate::diagnose::noise::in_time::still_share;
 use crate::diagnose::noise::moments::Moments;
+use crate::diagnose::noise::still::Still;
 use crate::diagnose::noise::tail_counts::tail;
 use crate::model::{Effect, NoiseModel};
 use crate::rng::{Seed, Stream};
@@ -38,8 +39,11 @@ fn plain(rng: &mut Stream) -> Vec<Structure> {
             variance_px2: 0.04,
             window_px: Some(1.0 + SCATTER * normal(rng)),
             lagged: std::array::from_fn(|_| Some(SCATTER * normal(rng))),
-            fixed_px2: Some(1e-4 * normal(rng)),
-            lines_px2: [Some(1e-4 * normal(rng)); 2],
+            still: Still {
+                fixed_px2: Some(1e-4 * normal(rng)),
+                lines_px2: [Some(1e-4 * normal(rng)); 2],
+                ..Still::default()
+            },
             row_px2: Some(1e-4 * normal(rng)),
             column_px2: Some(1e-4 * normal(rng)),
             ..Structure::default()
@@ -112,7 +116,7 @@ fn each_structure_has_its_name_and_size() {
     let cases: [(Add, &str, &str, f64); 4] = [
         (|s| s.window_px = s.window_px.map(|w| 5.0 * w), "spatial-correlation", "length_px", 5.0),
         (
-            |s| s.fixed_px2 = s.fixed_px2.map(|f| f + 0.004),
+            |s| s.still.fixed_px2 = s.still.fixed_px2.map(|f| f + 0.004),
             "fixed-pattern-noise",
             "sigma_px",
             0.004f64.sqrt(),
@@ -207,7 +211,7 @@ fn columns_that_move_as_one_have_no_name() {
     type Add = fn(&mut Structure);
     let cases: [(Add, Statistic); 2] = [
         (|s| s.column_px2 = s.column_px2.map(|c| c + 0.01), Statistic::Correlation),
-        (|s| s.lines_px2[0] = s.lines_px2[0].map(|c| c + 0.01), Statistic::Bias),
+        (|s| s.still.lines_px2[0] = s.still.lines_px2[0].map(|c| c + 0.01), Statistic::Bias),
     ];
     for (add, statistic) in cases {
         let mut rng = Seed(4).stream("noise/columns");
@@ -297,11 +301,11 @@ fn what_views_share_errs_as_pairs_do() {
                 .iter()
                 .map(|m| Structure {
                     pixels: PIXELS as f64,
-                    fixed_px2: Some(with_others(m)),
+                    still: Still { fixed_px2: Some(with_others(m)), ..Still::default() },
                     ..Structure::default()
                 })
                 .collect();
-            ViewMean::of_pairs(&views, |s| s.fixed_px2).expect("a mean").p_above(0.0) < 0.05
+            ViewMean::of_pairs(&views, |s| s.still.fixed_px2).expect("a mean").p_above(0.0) < 0.05
         })
         .count();
     assert!(alarms <= 36, "{alarms} of 400");

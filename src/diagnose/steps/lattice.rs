@@ -12,6 +12,12 @@ use crate::view::Sensor;
 #[derive(Debug, Clone)]
 pub struct RawHistogram(pub Vec<u32>);
 
+impl Default for RawHistogram {
+    fn default() -> Self {
+        RawHistogram(vec![0; 1 << 16])
+    }
+}
+
 /// A step that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
@@ -58,10 +64,6 @@ impl Quantisation {
 }
 
 impl RawHistogram {
-    pub fn none() -> Self {
-        RawHistogram(vec![0; 1 << 16])
-    }
-
     pub fn merge(&mut self, other: &RawHistogram) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
     }
@@ -242,7 +244,7 @@ mod tests {
 
     fn words(step_px: f64, rounding: f64) -> RawHistogram {
         let mut rng = Seed(1).stream("lattice");
-        let mut words = RawHistogram::none();
+        let mut words = RawHistogram::default();
         let sensor = kinect_v1(1);
         for _ in 0..200_000 {
             let z: f64 = rng.random_range(0.8..3.0);
@@ -267,7 +269,7 @@ mod tests {
         let sensor = Sensor { code, ..kinect_v1(1) };
         let mut rng = Seed(4).stream("lattice/raw");
         let mut found = |step_px: f64| {
-            let mut words = RawHistogram::none();
+            let mut words = RawHistogram::default();
             for _ in 0..100_000 {
                 let noise: f64 = StandardNormal.sample(&mut rng);
                 let mut d = rng.random_range(14.0..44.0) + 0.08 * noise;
@@ -310,7 +312,7 @@ mod tests {
         let sensor = kinect_v1(2);
         let counts = [10, 75, 382, 75, 66, 5, 75, 255, 35, 4, 158];
         let words = [3398, 3625, 3884, 4183, 4531, 4943, 5437, 6042, 6797, 7768, 9063];
-        let mut histogram = RawHistogram::none();
+        let mut histogram = RawHistogram::default();
         let readings = words.iter().zip(counts);
         histogram.count(readings.flat_map(|(word, n)| std::iter::repeat_n(*word, 1000 * n)));
         assert!(histogram.is_few());

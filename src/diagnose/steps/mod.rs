@@ -62,7 +62,7 @@ pub(in crate::diagnose) fn lattice<'a>(
     fields: impl IntoIterator<Item = &'a Field>,
     recording: &Recording,
 ) -> Quantisation {
-    let (mut words, mut pictures) = (RawHistogram::none(), RawHistogram::none());
+    let (mut words, mut pictures) = (RawHistogram::default(), RawHistogram::default());
     let mut scale_px_m = 0.0;
     for f in fields {
         words.merge(&f.words);
@@ -199,7 +199,7 @@ pub(in crate::diagnose) fn contradicted(
     known: &KnownTerms,
     recording: &Recording,
 ) -> Vec<Finding> {
-    let mut words = RawHistogram::none();
+    let mut words = RawHistogram::default();
     fields.iter().for_each(|f| words.merge(&f.words));
     let of = |kind: &Kind| {
         let step = known.parameter(kind.id, kind.parameter)?;

@@ -104,6 +104,11 @@ pub fn take_out_cubic(values: &mut [f32], pixels: &[u32], width: usize) {
     }
 }
 
+/// Of means over a square of white pixels, the squared correlation summed over all lags.
+pub fn repeats_of_box(side: f64) -> f64 {
+    ((2.0 * side * side + 1.0) / (3.0 * side)).powi(2)
+}
+
 /// Beyond this an error is gross: six robust standard deviations of what is there about nothing. None is where most
 /// errors are nothing.
 pub fn gross_limit(image: &[f32]) -> f32 {

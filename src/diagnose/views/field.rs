@@ -20,7 +20,7 @@ use crate::terms::edge_distances;
 use crate::view::{Sensor, View};
 
 /// One view's residuals.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Field {
     pub name: String,
     /// On the recording's clock, s.
@@ -112,20 +112,8 @@ impl Field {
         known: &KnownTerms,
         session_start: f64,
     ) -> Self {
-        let n = self.pixels.len();
-        let mut field = Field {
-            mean: vec![0.0; n],
-            square: vec![0.0; n],
-            count: vec![0; n],
-            measured: vec![0; n],
-            first: Vec::new(),
-            frames: Vec::new(),
-            lines: Vec::new(),
-            column_steps: None,
-            words: RawHistogram::none(),
-            pictures: RawHistogram::none(),
-            ..self.clone()
-        };
+        let mut field = self.clone();
+        field.forget();
         field.accumulate(frames, bench, sigma, known, session_start);
         field
     }
@@ -209,43 +197,23 @@ impl Field {
         [width, height]: [usize; 2],
         mut pixels: Vec<u32>,
     ) -> Self {
-        let n = pixels.len();
         // All views stay in memory together.
         pixels.shrink_to_fit();
-        let mut field = Field {
-            name: String::new(),
-            time_s: 0.0,
-            plane,
-            scale_px_m,
-            width,
-            height,
-            pixels,
-            edge: Vec::new(),
-            sigma: Vec::new(),
-            spread_px: 0.0,
-            mean: vec![0.0; n],
-            square: vec![0.0; n],
-            count: vec![0; n],
-            measured: vec![0; n],
-            first: Vec::new(),
-            frames: Vec::new(),
-            lines: Vec::new(),
-            column_steps: None,
-            reference_distance_m: None,
-            flatness_m: None,
-            temperature_c: None,
-            left_out: LeftOut::default(),
-            ambient_lux: None,
-            light: Vec::new(),
-            infrared: None,
-            words: RawHistogram::none(),
-            pictures: RawHistogram::none(),
-            region_given: false,
-            edges: Edges::default(),
-        };
+        let mut field = Field { plane, scale_px_m, width, height, pixels, ..Field::default() };
+        field.forget();
         let distances = edge_distances(&field.on_target(), width);
         field.edge = field.pixels.iter().map(|&i| distances[i as usize]).collect();
         field
+    }
+
+    /// Nothing is measured at the pixels yet.
+    pub(super) fn forget(&mut self) {
+        let n = self.pixels.len();
+        (self.mean, self.square) = (vec![0.0; n], vec![0.0; n]);
+        (self.count, self.measured) = (vec![0; n], vec![0; n]);
+        (self.first, self.frames, self.lines) = (Vec::new(), Vec::new(), Vec::new());
+        (self.words, self.pictures) = Default::default();
+        self.column_steps = None;
     }
 
     /// Disparity of the plane at pixel number `k` of the target, px.

@@ -47,9 +47,7 @@ impl Field {
         keep(&mut self.sigma, &kept);
         keep(expected, &kept);
         keep(&mut self.edge, &kept);
-        let n = self.pixels.len();
-        (self.mean, self.square) = (vec![0.0; n], vec![0.0; n]);
-        (self.count, self.measured) = (vec![0; n], vec![0; n]);
+        self.forget();
     }
 }
 

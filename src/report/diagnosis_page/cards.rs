@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 
 use super::sentences::{
-    axis, badge, called, capital, chance, description, halves, interval, mm, physics, sentence,
-    statistic, title,
+    axis, badge, called, capital, chance, description, halves, interval, mm, sentence, statistic,
+    title,
 };
 use super::{curve, parameters, table};
 use crate::capture::far_side;
@@ -48,7 +48,7 @@ fn card((i, finding): (usize, &&Finding)) -> Result<Markup> {
                 (heading(3, &table::title(i, finding)))
                 span class={ "badge " (class) } { (badge) }
             }
-            p { (prose(&physics(finding))) }
+            p { (prose(&sentence(&finding.physics))) }
             div.halves {
                 (facts(finding_facts(finding)))
                 @if let Some(drawing) = picture { figure {

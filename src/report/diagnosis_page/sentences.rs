@@ -130,26 +130,6 @@ pub(super) fn badge(finding: &Finding) -> (&'static str, &'static str) {
     }
 }
 
-/// The physics of a finding; what is known from the catalogue where the diagnosis says nothing.
-pub(super) fn physics(finding: &Finding) -> String {
-    if !finding.physics.is_empty() {
-        return sentence(&finding.physics);
-    }
-    let known = finding.effect.map_or("", description);
-    match finding.status {
-        Status::Named | Status::OneOf => sentence(known),
-        Status::Unexplained => {
-            let shape = finding.shape.as_ref().map_or("".into(), |s| format!(" Its curve: {s}."));
-            let over = axis(finding.axis);
-            format!("No effect of the catalogue explains this error over the {over}.{shape}")
-        }
-        Status::Recalibrate => "Other parameters of the same model explain the recording.".into(),
-        Status::NotIdentifiable => {
-            format!("Views of a flat target do not show this effect. {}", sentence(known))
-        }
-    }
-}
-
 pub(super) fn axis(axis: Axis) -> &'static str {
     axis.in_words()
 }
