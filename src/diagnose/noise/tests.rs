@@ -41,6 +41,7 @@ fn plain(rng: &mut Stream) -> Vec<Structure> {
             lagged: std::array::from_fn(|_| Some(SCATTER * normal(rng))),
             still: Still {
                 fixed_px2: Some(1e-4 * normal(rng)),
+                fixed_pixels: 1e5,
                 lines_px2: [Some(1e-4 * normal(rng)); 2],
                 ..Still::default()
             },
