@@ -1,4 +1,4 @@
-//! Recording in, noise model out (Yamaguchi et al. 2016, section II).
+//! Calibrates the noise model of a recording (Yamaguchi et al. 2016, section II).
 
 mod uncertainty;
 
@@ -28,11 +28,11 @@ use uncertainty::uncertainty_of;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CalibrateOptions {
     pub measure: MeasureOptions,
-    /// Which standard deviation the model describes.
+    /// The standard deviation that the model describes.
     pub kind: SigmaKind,
     /// The form to fit; `None` takes the one that predicts left-out distances best.
     pub form: Option<Form>,
-    /// When the model says it was made; now where `None`.
+    /// Creation time to write into the model; the current time if `None`.
     pub created: Option<SystemTime>,
 }
 
@@ -49,25 +49,25 @@ pub struct Measurements {
     pub views: Vec<ViewMeasurement>,
     /// Views that could not be opened or measured, and why.
     pub excluded: Vec<Excluded>,
-    /// Where many of these are flat as ranges: that they are, in words.
+    /// A remark where many excluded views are flat as ranges.
     pub ranges: Option<String>,
 }
 
 #[derive(Debug, Clone)]
 pub struct Calibration {
-    /// What was fitted to.
+    /// The fitted data.
     pub table: SigmaTable,
     pub fit: SigmaFit,
     /// How well each form predicts distances left out, best first; empty with too few distances.
     pub comparison: Vec<HeldOut>,
     pub model: NoiseModel,
-    /// What to know before trusting it, the most important first.
+    /// What to know before trusting the model, the most important first.
     pub warnings: Vec<String>,
 }
 
-/// Measure every view. A view without a plane is excluded, with its reason, and so is a copy of another: it would
-/// count as one more measurement. `progress` counts views.
-/// An error when no view can be measured at all; the message gives the first reason.
+/// Measures every view. A view without a plane is excluded, with the reason, and so is a copy of another,
+/// which would count twice. `progress` counts views.
+/// Fails when no view can be measured; the message gives the first reason.
 pub fn measure(
     recording: &Recording,
     options: &MeasureOptions,
@@ -93,8 +93,8 @@ pub fn measure(
     Ok(measurements)
 }
 
-/// Fit the noise model to the measured views.
-/// An error when the views are too few or too alike for the form, or a description is gone.
+/// Fits the noise model to the measured views.
+/// Fails when the views are too few or too alike for the form, or a description file cannot be read.
 pub fn model_of(
     recording: &Recording,
     measurements: &Measurements,
@@ -123,8 +123,8 @@ pub fn model_of(
     Ok(Calibration { table, fit, comparison, model, warnings })
 }
 
-/// The paper's form of sigma for a recording that comes without a model; where it has no positive fit,
-/// another form, which the model's first remark says. The last of them, k z^2, fits any sigmas.
+/// Calibrates the paper's form of sigma, for a recording without a model. Where that has no positive fit,
+/// takes another form and says so in the model's first remark. The last of them, k z^2, fits any sigmas.
 ///
 /// # Errors
 /// As [`measure`] and [`model_of`].
@@ -152,7 +152,7 @@ pub fn paper_model(
     Err(first)
 }
 
-/// Fit a bare table that was read from `source`; of the options only `form` and `created` count.
+/// Fits a bare table that was read from `source`; of the options only `form` and `created` are used.
 pub fn model_of_table(
     table: &SigmaTable,
     source: &Path,
@@ -220,8 +220,8 @@ fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
     value.as_object().cloned().unwrap_or_default()
 }
 
-/// Hash of the description files, and of every view's frames. An error when one can no longer be
-/// read: a hash of nothing would vouch for the wrong input.
+/// Hashes of the description files and of all views' frames. Fails when a file can no longer be read: a
+/// hash without it would vouch for the wrong input.
 fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<String, Value>> {
     let mut map = Map::new();
     let mut described = Sha256::new();
@@ -240,11 +240,11 @@ fn hashes(recording: &Recording, measurements: &Measurements) -> Result<Map<Stri
     Ok(map)
 }
 
-/// What a person should know before trusting the model, the most important first.
+/// What a user should know before trusting the model, the most important first.
 fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFit) -> Vec<String> {
     let mut warnings: Vec<String> = measurements.ranges.iter().cloned().collect();
     warnings.extend(measurements.excluded.iter().map(ToString::to_string));
-    // Views left out while opening stand here too.
+    // These include views left out while opening.
     warnings.extend(recording.remarks.iter().cloned());
     let total = measurements.views.len();
     let smooth = measurements.views.iter().filter(|v| v.correlation.persists).count();
@@ -269,7 +269,7 @@ fn warnings_of(recording: &Recording, measurements: &Measurements, fit: &SigmaFi
     warnings
 }
 
-/// One remark for all views whose distance is not what was measured by other means.
+/// One remark for all views whose distance contradicts their reference.
 fn off_reference(views: &[ViewMeasurement]) -> Option<String> {
     let known: Vec<_> = views.iter().filter_map(|v| Some((v, v.reference()?))).collect();
     let off = known.iter().filter(|(_, r)| r.contradicts());

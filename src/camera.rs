@@ -1,4 +1,4 @@
-//! The pinhole camera with the Brown-Conrady lens: which ray of the optical frame a pixel looks along.
+//! The pinhole camera with the Brown-Conrady lens: the ray of each pixel in the optical frame.
 //!
 //! Optical frame: x right (along the columns u), y down (along the rows v), z forward, metres.
 
@@ -26,7 +26,7 @@ pub struct Camera {
 /// What can be wrong with a [`Camera`].
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CameraFault {
-    /// No pixel, or more than any sensor has; px.
+    /// No pixels, or more than any sensor has: width, height, px.
     #[error("width x height, {0} x {1} px, is no image size")]
     Size(usize, usize),
     /// fx, fy, px.
@@ -54,7 +54,7 @@ pub enum CameraFault {
     FieldOfView(f64),
     #[error("the distortion coefficients are not finite")]
     Coefficients,
-    /// A pixel that no ray is bent to: undistortion does not settle there.
+    /// A pixel without a ray: undistortion does not converge there.
     #[error(
         "distortion {} has no ray for pixel ({u}, {v}); check the order of the coefficients and that they \
          belong to these fx, fy",
@@ -71,7 +71,7 @@ pub enum CameraFault {
          coefficients", listed(.0), TANGENTIAL, TANGENTIAL
     )]
     Tangential([f64; 5]),
-    /// The image folds back on itself: rays farther out are bent to pixels farther in.
+    /// The image folds back on itself: rays farther out map to pixels farther in.
     #[error(
         "distortion {} folds the image inside its corners; check the order of the coefficients and that they \
          belong to these fx, fy", listed(.0)
@@ -79,7 +79,7 @@ pub enum CameraFault {
     Fold([f64; 5]),
 }
 
-/// The key that is wrong: a message names it first, and its line is looked for by it.
+/// The wrong key. Messages begin with it, and its line in the file is found by it.
 fn bad_focal(fx: f64) -> &'static str {
     if fx.is_finite() && fx > 0.0 { "fy" } else { "fx" }
 }
@@ -93,13 +93,13 @@ fn listed(k: &[f64; 5]) -> String {
 }
 
 impl Camera {
-    /// Its principal point in the image's middle, square pixels, no lens errors.
+    /// The principal point in the middle of the image, square pixels, no distortion.
     pub fn centred(width: usize, height: usize, focal_px: f64) -> Self {
         let [cx, cy] = [width, height].map(|n| (n as f64 - 1.0) / 2.0);
         Camera { width, height, fx: focal_px, fy: focal_px, cx, cy, distortion: None }
     }
 
-    /// What is wrong with these numbers, if anything. With a lens model every pixel is tried.
+    /// What is wrong with these numbers, if anything. With a lens model every pixel is checked.
     pub fn fault(&self) -> Option<CameraFault> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let Camera { width, height, fx, fy, cx, cy, distortion } = *self;
@@ -139,7 +139,7 @@ impl Camera {
         folds(&k, farthest).then_some(CameraFault::Fold(k))
     }
 
-    /// Horizontal, without the lens, rad.
+    /// Horizontal field of view, ignoring distortion, rad.
     fn field_of_view(&self) -> f64 {
         ((self.cx + 0.5) / self.fx).atan() + ((self.width as f64 - 0.5 - self.cx) / self.fx).atan()
     }
@@ -150,7 +150,7 @@ impl Camera {
 
     /// Normalised image coordinates (x, y), so that the pixel's ray is (x, y, 1): dimensionless.
     ///
-    /// With a lens model the ray is found by Newton's method; NaN where that does not settle, which
+    /// With a lens model the ray is found by Newton's method; NaN where that does not converge, which
     /// [`Camera::fault`] reports beforehand.
     pub fn ray(&self, u: f64, v: f64) -> (f64, f64) {
         let [xd, yd] = self.bent(u, v);
@@ -166,12 +166,12 @@ impl Camera {
         found.unwrap_or((f64::NAN, f64::NAN))
     }
 
-    /// Where a pixel lies behind the lens, in normalised coordinates.
+    /// Distorted normalised coordinates of a pixel.
     fn bent(&self, u: f64, v: f64) -> [f64; 2] {
         [(u - self.cx) / self.fx, (v - self.cy) / self.fy]
     }
 
-    /// The rays of a row, one after the other: each is looked for where the two before it point.
+    /// The rays of a row; the search for each starts at the extrapolation of the two before it.
     fn row(&self, v: usize) -> impl Iterator<Item = (f64, f64)> {
         let mut before: [Option<(f64, f64)>; 2] = [None, None];
         (0..self.width).map(move |u| {
@@ -185,7 +185,7 @@ impl Camera {
         })
     }
 
-    /// Where the ray (x, y, 1) meets the image, px: the inverse of [`Camera::ray`].
+    /// Projects the ray (x, y, 1) to pixel coordinates: the inverse of [`Camera::ray`].
     pub fn project(&self, x: f64, y: f64) -> (f64, f64) {
         let (x, y) = match self.distortion {
             Some(k) => {
@@ -211,23 +211,23 @@ impl Camera {
     }
 }
 
-/// fx over fy, or its inverse: pixels are square to a percent. With cx and cy in their place it is
-/// 1.33 for images of 4:3 whose principal point is in the middle.
+/// Limit of fx over fy and of its inverse: pixels are square to a percent. With cx and cy in their place
+/// the ratio is 1.33, for images of 4:3 with the principal point in the middle.
 const MAX_ASPECT: f64 = 1.25;
-/// Tangential distortion of a lens that no one would use. Within it each of 5,000 lenses drawn at
-/// random gave the rays of twenty places drawn at random; of lenses up to 0.5 one in a hundred did not.
+/// Limit of tangential distortion, beyond any usable lens. Within it, all of 5,000 random lenses gave the
+/// rays of twenty random places; of lenses up to 0.5, one in a hundred did not.
 const TANGENTIAL: f64 = 0.1;
-/// The widest depth camera has 127 degrees (OAK-D W), and a hundred columns cut out of a Kinect's
-/// image 10. A focal length in mm or as a share of the image's width falls outside, degrees.
+/// Accepted fields of view, degrees. The widest depth camera has 127 (OAK-D W), and a hundred columns cut
+/// out of a Kinect's image 10. Focal lengths in mm or as a share of the image width fall outside.
 const FIELD_DEG: [f64; 2] = [2.0, 140.0];
 
-/// Is this coordinate, px, on one of `size` pixels?
+/// Whether this coordinate, px, lies on one of `size` pixels.
 fn inside(at: f64, size: usize) -> bool {
     (-0.5..=size as f64 - 0.5).contains(&at)
 }
 
-/// 16 megapixels are ten times what any depth sensor has; more is a slip or damage, and the rays
-/// of all pixels would take gigabytes before the first image shows the contradiction.
+/// 16 megapixels, ten times what any depth sensor has. More is a mistake or damage, and the rays of all
+/// pixels would take gigabytes before the first image shows the contradiction.
 const MAX_PIXELS: usize = 1 << 24;
 
 pub(crate) fn usable_size(width: usize, height: usize) -> bool {
@@ -249,13 +249,13 @@ impl Rays {
     }
 }
 
-/// Newton's method doubles the digits a round; near a fold it halves the error, from 1 to 1e-6 in 20.
+/// Newton's method doubles the digits each round; near a fold it halves the error, from 1 to 1e-6 in 20.
 const MAX_ROUNDS: usize = 30;
-/// Last change of the normalised coordinates: its square, the error that is left, is 1e-9 px at
-/// 1000 px of focal length.
+/// Converged below this change of the normalised coordinates: the remaining error, its square, is 1e-9 px
+/// at 1000 px of focal length.
 const SETTLED: f64 = 1e-6;
 
-/// The ray (x, y, 1) that the lens bends to (xd, yd, 1), looked for from `start`.
+/// The ray (x, y, 1) that the lens maps to (xd, yd, 1), by Newton's method from `start`.
 fn undistorted(k: &[f64; 5], [xd, yd]: [f64; 2], start: (f64, f64)) -> Option<(f64, f64)> {
     let [k1, k2, p1, p2, k3] = *k;
     let (mut x, mut y) = start;
@@ -272,17 +272,17 @@ fn undistorted(k: &[f64; 5], [xd, yd]: [f64; 2], start: (f64, f64)) -> Option<(f
         let step_y = (along_x * off_y - across * off_x) / det;
         (x, y) = (x - step_x, y - step_y);
         if step_x.abs().max(step_y.abs()) < SETTLED {
-            // Beyond a fold the image is turned over, or the ray comes from the far side of the axis.
+            // Rejects solutions beyond a fold, where the image is mirrored or the ray is across the axis.
             return (radial > 0.0 && det > 0.0 && along_x > 0.0).then_some((x, y));
         }
     }
     None
 }
 
-/// Steps in which a ray that is not found at once is followed outwards from the axis.
+/// Continuation steps outwards from the axis, for a ray that is not found directly.
 const STEPS: u32 = 32;
 
-/// The same, each step's ray looked for from the one before: where a lens bends much.
+/// As [`undistorted`] for strong distortion: by continuation, each step starting from the ray before.
 fn followed(k: &[f64; 5], [xd, yd]: [f64; 2]) -> Option<(f64, f64)> {
     (1..=STEPS).try_fold((0.0, 0.0), |before, n| {
         let share = f64::from(n) / f64::from(STEPS);
@@ -290,14 +290,15 @@ fn followed(k: &[f64; 5], [xd, yd]: [f64; 2]) -> Option<(f64, f64)> {
     })
 }
 
-/// Does the bent radius r (1 + k1 s + k2 s^2 + k3 s^3), s = r^2, fall anywhere up to s = `farthest`?
-/// Its slope is 1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3, least at the end or where its own slope is zero.
+/// Whether the distorted radius r (1 + k1 s + k2 s^2 + k3 s^3), s = r^2, decreases anywhere up to
+/// s = `farthest`. Its slope 1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3 is least at the end or where its own
+/// derivative is zero.
 fn folds(k: &[f64; 5], farthest: f64) -> bool {
     let [k1, k2, _, _, k3] = *k;
     let slope = |s: f64| 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * 7.0 * k3));
     let (a, b, c) = (21.0 * k3, 10.0 * k2, 3.0 * k1);
     let root = (b * b - 4.0 * a * c).sqrt();
-    // Both roots in the form that does not cancel; NaN and infinity fall outside the range.
+    // Both roots in the form without cancellation; NaN and infinity fall outside the range.
     let q = -0.5 * (b + b.signum() * root);
     let mut places = [farthest, q / a, c / q].into_iter().filter(|s| (0.0..=farthest).contains(s));
     places.any(|s| slope(s) <= 0.0)

@@ -1,4 +1,4 @@
-//! One error type for the library: what went wrong, where, and what to do about it.
+//! The library's error type: what went wrong, where, and what to do about it.
 
 use std::path::{Path, PathBuf};
 
@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 pub enum Error {
     /// The operating system refused to read or write.
     ///
-    /// The cause stands in the message and is therefore not [`std::error::Error::source`] too: a
-    /// chain of causes would say it twice.
+    /// The message includes the cause, so it is not also the [`std::error::Error::source`]: printing the
+    /// chain would repeat it.
     #[error("{}: {cause}; {remedy}", path.display())]
     Io { path: PathBuf, cause: std::io::Error, remedy: &'static str },
-    /// A line of a text file (JSON, `depth.txt`, a table) that is not understood; 0 is all of it.
+    /// A line of a text file (JSON, `depth.txt`, a table) that cannot be parsed; 0 means the whole file.
     #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
     Text { path: PathBuf, line: usize, what: String, remedy: &'static str },
-    /// An image that is damaged or not of the promised kind.
+    /// An image that is damaged or not of the expected kind.
     #[error("{}: {what}; {remedy}", path.display())]
     Image { path: PathBuf, what: String, remedy: &'static str },
     /// A folder that holds no recording, or one that contradicts itself.
@@ -34,7 +34,7 @@ pub enum Error {
     /// An option or argument outside its range.
     #[error("{what}; {remedy}")]
     Argument { what: String, remedy: &'static str },
-    /// A live sensor that cannot be had.
+    /// A live sensor that is not available.
     #[error("{what}; {remedy}")]
     Sensor { what: String, remedy: &'static str },
     /// A picture or page could not be drawn.
@@ -71,7 +71,7 @@ impl Error {
         Error::Io { path: path.to_path_buf(), cause, remedy }
     }
 
-    /// Where the message names no file: of this one, or of this folder.
+    /// Adds the file or folder to a message that names none.
     pub fn of(self, path: &Path) -> Self {
         let named = |what: String| format!("{}: {what}", path.display());
         match self {

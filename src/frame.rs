@@ -20,14 +20,14 @@ pub enum DepthCode {
     /// z = raw / units_per_metre (5000 in the TUM layout, 1000 for OpenNI and ROS).
     Metric {
         units_per_metre: f64,
-        /// The raw value for "no measurement"; 0 is one too.
+        /// The raw value for "no measurement", besides 0.
         invalid: u16,
     },
     /// z = 1 / (offset + slope * raw): the 11-bit values of a Kinect v1.
     Disparity {
         /// Inverse depth of the raw value 0, 1/m.
         offset: f64,
-        /// Inverse depth a raw unit, 1/m; negative for a Kinect v1.
+        /// Inverse depth per raw unit, 1/m; negative for a Kinect v1.
         slope: f64,
         invalid: u16,
     },
@@ -71,7 +71,7 @@ impl DepthCode {
         (z.is_finite() && z > 0.0 && z < FARTHEST_M).then_some(z)
     }
 
-    /// The raw value nearest to depth `z` (m), or the one for "no measurement" when none fits.
+    /// The raw value nearest to the depth `z` (m), or the one for "no measurement" when none fits.
     pub fn raw(&self, z: f64) -> u16 {
         let (exact, invalid, top) = match *self {
             DepthCode::Metric { units_per_metre, invalid } => {
@@ -125,15 +125,16 @@ impl DepthCode {
     }
 }
 
-/// From decimetres to micrometres, of which 16 bit hold 65 mm.
+/// Accepted units per metre, from decimetres to micrometres (with which 16 bits reach 65 mm).
 pub const UNITS_PER_METRE: [f64; 2] = [10.0, 1e6];
-/// One over the depth of the raw value 0, 1/m: a centimetre.
+/// Largest inverse depth of the raw value 0, 1/m: a depth of one centimetre.
 const MAX_OFFSET: f64 = 100.0;
-/// Of a raw unit, 1/m. A Kinect has 0.003; the finest is 1/256 px of a stereo pair on a car's roof.
+/// Accepted inverse depth per raw unit, 1/m. A Kinect has 0.003; the finest is 1/256 px of a stereo pair
+/// on a car's roof.
 const SLOPE: [f64; 2] = [1e-7, 1.0];
 
-/// Farther than any sensor of this kind can see: 1/(c0 + c1 raw) has a pole, and values just
-/// before it would otherwise count as walls a kilometre away.
+/// Beyond the range of any sensor of this kind, m: 1/(c0 + c1 raw) has a pole, and values just before it
+/// would otherwise count as walls a kilometre away.
 pub(crate) const FARTHEST_M: f64 = 100.0;
 
 #[derive(Debug, Clone)]

@@ -32,14 +32,14 @@
 //!    could not determine, and how well each form predicts distances left out.
 //! 4. [`diagnose::diagnose`] compares the recording with the model, locates what does not agree and
 //!    names its cause from the [catalogue of effects](docs::catalogue). The effects found extend the
-//!    model, with the covariance of the shapes that were fitted. A model learnt from other views is
-//!    off by as much as that says, and such a difference is no finding.
-//! 5. The model is what everything else runs on: [`simulate`] draws recordings from it, [`correct`]
+//!    model, with the covariance of the fitted shapes. A difference within the covariance of a model
+//!    learnt from other views is not a finding.
+//! 5. Everything else runs on the model: [`simulate`] draws recordings from it, [`correct`]
 //!    takes its biases out of depth images and can say, pixel by pixel, how sure the result is, and
 //!    [`mod@map`] weighs points by its sigma. [`fleet`] puts the models of several units side by side.
 //!
-//! Simulated data enters by the same door as real data: [`simulate`] writes a folder, [`io::open`]
-//! reads it. The examples below use that to run anywhere.
+//! Simulated data is read like real data: [`simulate`] writes a folder, [`io::open`] reads it. The
+//! examples below use that to run anywhere.
 //!
 //! # Calibrate
 //!
@@ -144,12 +144,12 @@
 //! - [`docs::capture`]: how to take views with a Kinect
 //! - [`docs::identifiability`]: what views of planes can show, and what they cannot
 //! - [`docs::engine`]: how the diagnosis works, and where in the code
-//! - [`report`]: the pages; what they say of an effect is on its card in `src/effects`, and the other
+//! - [`report`]: the pages; their text on an effect is on its card in `src/effects`, and the other
 //!   sentences of a diagnosis are in `story.rs` and `sentences.rs` of `src/report/diagnosis_page`
 //!
-//! The method of the calibration and of the paper's mapper: Yamaguchi, Emaru, Kobayashi, Ravankar,
-//! "3D map-building from RGB-D data considering noise characteristics of Kinect" (SII 2016). It is
-//! "the paper" in these pages.
+//! "The paper" in these pages, the source of the calibration and of the paper's mapper: Yamaguchi, Emaru,
+//! Kobayashi, Ravankar, "3D map-building from RGB-D data considering noise characteristics of Kinect"
+//! (SII 2016).
 
 #![deny(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! The thin skin: parse, dispatch, print the error once, exit code.
+//! Thin entry point: parse, dispatch, print the error once, set the exit code.
 
 #![forbid(unsafe_code)]
 

@@ -1,8 +1,8 @@
-//! How long work tells what it is at.
+//! Progress reports of long work.
 
-/// Hears what goes on. A closure of (steps done, steps in all) hears the steps alone.
+/// Receives progress. A closure of (steps done, steps in all) receives the steps only.
 pub trait Watch: Sync {
-    /// What begins now, as "measuring".
+    /// Called when a stage begins, such as "measuring".
     fn stage(&self, _name: &'static str) {}
 
     fn step(&self, done: usize, all: usize);
@@ -14,5 +14,5 @@ impl<F: Fn(usize, usize) + Sync> Watch for F {
     }
 }
 
-/// Called as the work goes on.
+/// A progress receiver as functions take it.
 pub type Progress<'a> = &'a dyn Watch;

@@ -1,5 +1,5 @@
-//! Input files: regular ones, of a size that memory holds. A pipe would wait for ever, a device never
-//! ends, and a sparse file of a terabyte is made in a second.
+//! Reads input files, only regular ones of a size that fits in memory. A pipe would block for ever, a
+//! device never ends, and a sparse file of a terabyte is made in a second.
 
 use std::fs::{File, Metadata};
 use std::io::Read;
@@ -10,22 +10,22 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::units::shortest;
 
-/// Of lists, tables and trajectories, bytes: an hour of poses at 500 Hz.
+/// Size limit of lists, tables and trajectories, bytes: an hour of poses at 500 Hz.
 pub(crate) const MAX_TEXT: u64 = 1 << 28;
-/// Of JSON, bytes, which takes sixteen times its length in memory; a model with the covariance of
-/// every shape has 8 MB.
+/// Size limit of JSON, bytes, which takes sixteen times its length in memory; a model with the
+/// covariance of every shape has 8 MB.
 const MAX_JSON: u64 = 1 << 25;
-/// Of one text in it, bytes: notes of some pages. What is kept of it goes into every result.
+/// Length limit of a JSON string, bytes: notes of some pages. Strings that are kept go into every result.
 const MAX_WORDS: usize = 1 << 14;
-/// Of numbers: variances of what is hardly known at all are less, and squares of more have no number.
+/// Limit of numbers: variances of barely known parameters are less, and squares of much more overflow.
 pub(crate) const MAX_NUMBER: f64 = 1e30;
-/// Of an image, bytes: 16 megapixels in colour, not compressed, and what is written around them.
+/// Size limit of an image file, bytes: 16 megapixels in colour, uncompressed, with metadata.
 pub(crate) const MAX_IMAGE: u64 = 1 << 26;
-/// What stands around an image's pixels, bytes: profiles and comments.
+/// Allowance for an image's metadata (profiles, comments), bytes.
 const AROUND_IMAGE: u64 = 1 << 20;
 
-/// Open a file to read.
-/// An error when it cannot be, or is a folder, a pipe, a device or a socket.
+/// Opens a file for reading.
+/// Fails when it cannot be opened, or is a folder, a pipe, a device or a socket.
 pub(crate) fn open(path: &Path) -> Result<File> {
     let failed = |e| Error::read(path, e);
     match odd(&std::fs::metadata(path).map_err(failed)?) {
@@ -34,7 +34,7 @@ pub(crate) fn open(path: &Path) -> Result<File> {
     }
 }
 
-/// What stands there instead of a regular file, and what to do.
+/// What the path is instead of a regular file, and what to do.
 fn odd(kind: &Metadata) -> Option<(&'static str, &'static str)> {
     if kind.is_file() {
         None
@@ -46,8 +46,8 @@ fn odd(kind: &Metadata) -> Option<(&'static str, &'static str)> {
     }
 }
 
-/// Is there a file of this name?
-/// An error when something else is, which would otherwise be passed over.
+/// Whether a file of this name exists.
+/// Fails when something else does, which would otherwise be ignored silently.
 pub(crate) fn is_there(path: &Path) -> Result<bool> {
     let Ok(kind) = std::fs::metadata(path) else { return Ok(false) };
     match odd(&kind) {
@@ -56,7 +56,7 @@ pub(crate) fn is_there(path: &Path) -> Result<bool> {
     }
 }
 
-/// The first of these files that is there. Errors as those of [`is_there`].
+/// The first of these files that exists. Fails as [`is_there`] does.
 pub(crate) fn first_there(paths: impl IntoIterator<Item = PathBuf>) -> Result<Option<PathBuf>> {
     for path in paths {
         if is_there(&path)? {
@@ -66,12 +66,12 @@ pub(crate) fn first_there(paths: impl IntoIterator<Item = PathBuf>) -> Result<Op
     Ok(None)
 }
 
-/// All of a file that has `max` bytes or less.
+/// Reads a file of at most `max` bytes.
 fn bytes(path: &Path, max: u64) -> Result<Vec<u8>> {
     let failed = |e| Error::read(path, e);
     let file = open(path)?;
     let length = file.metadata().map_err(failed)?.len();
-    // It may grow while it is read.
+    // The file may grow while it is read.
     let mut bytes = Vec::new();
     if length <= max {
         file.take(max + 1).read_to_end(&mut bytes).map_err(failed)?;
@@ -93,7 +93,7 @@ fn text(path: &Path, max: u64) -> Result<String> {
     })
 }
 
-/// A list, a table or a trajectory.
+/// Reads a list, a table or a trajectory.
 pub(crate) fn read_text(path: &Path) -> Result<String> {
     text(path, MAX_TEXT)
 }
@@ -102,7 +102,7 @@ pub(crate) fn read_json(path: &Path) -> Result<String> {
     text(path, MAX_JSON)
 }
 
-/// The first text or number of a JSON document that nobody means, with its key.
+/// The first absurdly long string or absurdly large number of a JSON document, with its key.
 pub(crate) fn absurd(value: &Value) -> Option<String> {
     let off = |value: &Value| match value {
         Value::String(text) if text.len() > MAX_WORDS => {
@@ -130,8 +130,8 @@ pub(crate) fn absurd(value: &Value) -> Option<String> {
     }
 }
 
-/// What serde says of a JSON document, without the names of this program's types and without the line,
-/// which messages have by themselves.
+/// Serde's message on a JSON document, without Rust type names and without the line, which messages add
+/// themselves.
 pub(crate) fn plainly(error: &serde_json::Error) -> String {
     let full = error.to_string();
     let what = full.rsplit_once(" at line ").map_or(&*full, |(before, _)| before);
@@ -151,7 +151,7 @@ pub(crate) fn plainly(error: &serde_json::Error) -> String {
     format!("{before}, expected {plain}")
 }
 
-/// The bytes of a list, a table or a trajectory.
+/// Reads the bytes of a list, a table or a trajectory.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MAX_TEXT)
 }
@@ -160,10 +160,10 @@ pub(crate) fn read_image(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MAX_IMAGE)
 }
 
-/// A depth image of this width and height, px: what does not shrink is stored as it is, with a byte a row and five
-/// a block of 64 kB.
+/// Reads a depth image of this width and height, px. Incompressible data is stored as it is, with one more
+/// byte per row and five per block of 64 kB.
 pub(crate) fn read_depth_image(path: &Path, [width, height]: [usize; 2]) -> Result<Vec<u8>> {
-    // Any size may be asked for.
+    // The size comes from the input and may be anything.
     let raw = (width as u64).saturating_mul(height as u64).min(MAX_IMAGE) * 2;
     bytes(path, (raw + raw / 8 + AROUND_IMAGE).min(MAX_IMAGE))
 }

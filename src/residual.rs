@@ -14,7 +14,7 @@ pub fn axial(z: f64, plane: &Plane, x: f64, y: f64) -> f64 {
     z - plane.depth(x, y)
 }
 
-/// By what an axial residual on the ray (x, y, 1) is multiplied to become perpendicular.
+/// Factor that turns an axial residual on the ray (x, y, 1) into a perpendicular one.
 #[inline]
 pub fn perpendicular_per_axial(plane: &Plane, x: f64, y: f64) -> f64 {
     plane.inverse_depth(x, y) * plane.distance()

@@ -11,7 +11,7 @@ use crate::model::model_schema;
 pub enum SchemaOf {
     Model,
     Diagnosis,
-    /// Each row is an object by the names of the header; a field that is empty is null.
+    /// Each row is an object keyed by the names of the header; an empty field is null.
     Measurements,
 }
 
@@ -27,7 +27,7 @@ pub fn schema(of: SchemaOf) -> Schema {
 /// A row of `measurements.csv`: a cell, which is a view, or a bin of depth within a view that is
 /// strongly tilted.
 #[derive(JsonSchema)]
-#[allow(dead_code)] // It is a description; rows are written by `measure::write_measurements`.
+#[allow(dead_code)] // Describes the rows, which `measure::write_measurements` writes.
 struct MeasurementsRow {
     /// The view's name.
     view: String,

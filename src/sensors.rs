@@ -1,4 +1,4 @@
-//! Kinds of depth cameras, and what is usual of the common ones.
+//! Kinds of depth cameras, and typical properties of the common ones.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ pub enum SensorKind {
 }
 
 impl SensorKind {
-    /// Those that match, and have a disparity and a baseline.
+    /// The kinds that match patterns: they have a disparity and a baseline.
     pub const MATCHING: &[SensorKind] = &[SensorKind::StructuredLight, SensorKind::ActiveStereo];
     pub const ALL: &[SensorKind] =
         &[SensorKind::StructuredLight, SensorKind::ActiveStereo, SensorKind::TimeOfFlight];
@@ -27,7 +27,7 @@ impl SensorKind {
         self != SensorKind::TimeOfFlight
     }
 
-    /// In the middle of a sentence.
+    /// Name for use in the middle of a sentence.
     pub fn description(self) -> &'static str {
         match self {
             SensorKind::StructuredLight => "structured light",
@@ -37,42 +37,43 @@ impl SensorKind {
     }
 }
 
-/// Projector to camera in every Kinect v1, m (LDDIS of the OpenNI device properties; libfreenect:
-/// dcmos_emitter_distance = 7.5 cm); where a sensor without a given baseline is to have a disparity.
+/// Distance from projector to camera in every Kinect v1, m (LDDIS of the OpenNI device properties;
+/// libfreenect: dcmos_emitter_distance = 7.5 cm). Also used where a sensor without a given baseline needs
+/// a disparity.
 pub const KINECT_BASELINE_M: f64 = 0.075;
 
-/// z = 1/(3.33095 - 0.0030711 raw) of a Kinect v1: the fit OpenKinect users have shared since 2010, also in
-/// libfreenect's own viewer (examples/glpclview.c).
+/// z = 1/(3.33095 - 0.0030711 raw) of a Kinect v1: the fit that OpenKinect users have shared since 2010,
+/// also in libfreenect's own viewer (examples/glpclview.c).
 pub(crate) const OPENKINECT: DepthCode = DepthCode::Disparity {
     offset: 3.330_949_516_1,
     slope: -0.003_071_101_6,
     invalid: KINECT_NO_MEASUREMENT,
 };
 
-/// The finest difference that the default mode makes.
+/// Quantisation step of the default mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Step {
-    /// Of disparity, px.
+    /// Step in disparity, px.
     DisparityPx(f64),
-    /// Of depth, m.
+    /// Step in depth, m.
     DepthM(f64),
 }
 
-/// What is usual of a camera in its default mode; a unit differs by a percent or so.
+/// Typical properties of a camera in its default mode; a unit differs by a percent or so.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Preset {
     /// As given on the command line.
     pub id: &'static str,
     pub name: &'static str,
     pub kind: SensorKind,
-    /// Of the depth image, px.
+    /// Width and height of the depth image, px.
     pub size: (usize, usize),
     pub focal_px: f64,
     pub baseline_m: Option<f64>,
     pub step: Step,
 }
 
-/// Depth words of all of these are millimetres, as their drivers deliver them.
+/// All of the presets' drivers deliver depth in millimetres.
 pub const PRESET_UNITS_PER_METRE: f64 = 1000.0;
 
 pub static PRESETS: [Preset; 6] = [
@@ -155,7 +156,7 @@ impl Preset {
         PRESETS.iter().find(|p| p.id == id)
     }
 
-    /// fx, fy, cx, cy for images of this size, px: of the default mode, or shrunk as a whole.
+    /// fx, fy, cx, cy, px, for images of the default size or scaled; `None` for another aspect ratio.
     pub fn intrinsics(&self, (width, height): (usize, usize)) -> Option<[f64; 4]> {
         (self.size.0 * height == self.size.1 * width && width > 0).then(|| {
             let focal = self.focal_px * width as f64 / self.size.0 as f64;
@@ -164,7 +165,7 @@ impl Preset {
         })
     }
 
-    /// What is taken of it, for people.
+    /// Human-readable description of the values used.
     pub fn describe(&self) -> String {
         let baseline =
             self.baseline_m.map_or(String::new(), |b| format!(", baseline {:.0} mm", 1e3 * b));
@@ -186,7 +187,7 @@ impl Preset {
 mod tests {
     use super::*;
 
-    /// Intel's own formula, f = width/2 / tan(hfov/2), and a kind's baseline.
+    /// Intel's formula, f = width/2 / tan(hfov/2), and the baseline and step of each kind.
     #[test]
     fn presets_agree_with_themselves() {
         for preset in &PRESETS {

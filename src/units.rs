@@ -1,10 +1,10 @@
-//! Numbers as text, the same everywhere: short, and never a page of digits.
+//! Formats numbers as text, the same way everywhere: short, never a page of digits.
 
-/// From here on (and below its inverse) powers of ten are shorter than zeros; doubles no longer
-/// resolve units beyond 2^53 = 9e15.
+/// From here on (and below its inverse) an exponent is shorter than zeros; an `f64` no longer resolves
+/// units beyond 2^53 = 9e15.
 const MANY_DIGITS: f64 = 1e15;
 
-/// The shortest text that reads back to the same number, with a power of ten where it is long.
+/// The shortest text that parses back to the same number, with an exponent where it would be long.
 ///
 /// ```
 /// use kinoise::units::shortest;
@@ -15,7 +15,7 @@ pub fn shortest(v: f64) -> String {
     if is_long(v) { format!("{v:e}") } else { format!("{v}") }
 }
 
-/// Rounded to so many significant digits: what was calculated has no more to tell.
+/// Rounds to `digits` significant digits, for calculated values that carry no more information.
 ///
 /// ```
 /// use kinoise::units::to_digits;
@@ -25,7 +25,7 @@ pub fn to_digits(v: f64, digits: usize) -> f64 {
     format!("{v:.*e}", digits.saturating_sub(1)).parse().unwrap_or(v)
 }
 
-/// With this many decimals, or to three digits with a power of ten where the number is huge.
+/// Formats with this many decimals, or with three digits and an exponent where the number is huge.
 ///
 /// ```
 /// use kinoise::units::decimals;
@@ -46,7 +46,7 @@ pub fn counted(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
-/// The verb of so many.
+/// Singular or plural of a verb, by the count `n`.
 ///
 /// ```
 /// use kinoise::units::verb;

@@ -21,13 +21,14 @@ use crate::frame::{DepthCode, Frame};
 use crate::sensors::SensorKind;
 use crate::units::shortest;
 
-/// From half of the smallest structured-light module's (1 cm) to twice the longest stereo rig's on a
-/// car's roof (1.5 m).
+/// Accepted baselines, m: from half that of the smallest structured-light module (1 cm) to twice that of
+/// the longest stereo rig on a car's roof (1.5 m).
 pub const BASELINE_M: [f64; 2] = [0.005, 3.0];
-/// Where a disparity is as large as the image is wide. Stereo cameras on cars see from 2 to 3 m on.
+/// Limit of the depth at which the disparity equals the image width, m. Stereo cameras on cars see from
+/// 2 to 3 m on.
 const MAX_NEAREST_M: f64 = 10.0;
 
-/// Characters of a name: vendors' longest have fifty.
+/// Longest name, characters; the longest of vendors have fifty.
 const MAX_NAME: usize = 200;
 
 /// The unit that was recorded: everything `recording.json` says about it.
@@ -43,17 +44,17 @@ pub struct Sensor {
     pub code: DepthCode,
     /// How well the intrinsics are known, where the recording says so.
     pub intrinsics_uncertainty: Option<IntrinsicsUncertainty>,
-    /// How it comes to its depth, where that is known.
+    /// How it measures depth, where that is known.
     pub kind: Option<SensorKind>,
 }
 
 impl Sensor {
-    /// fx * baseline: disparity in px is this over the depth in m.
+    /// fx * baseline, px m: the disparity in px is this over the depth in m.
     pub fn disparity_px_m(&self) -> Option<f64> {
         self.baseline_m.filter(|_| self.may_have_disparity()).map(|b| self.camera.fx * b)
     }
 
-    /// Not a time-of-flight camera, as far as is known.
+    /// Whether it is not known to be a time-of-flight camera.
     pub fn may_have_disparity(&self) -> bool {
         self.kind.is_none_or(SensorKind::has_disparity)
     }
@@ -66,7 +67,7 @@ impl Sensor {
         numbers.or_else(uncertainty).or_else(|| self.name_fault())
     }
 
-    /// Names stand in every result, and on one line of it.
+    /// Checks the names, which appear in every result, each on one line.
     fn name_fault(&self) -> Option<String> {
         let (serial, mode) = (self.serial.as_deref(), self.mode.as_deref());
         let names = [("sensor", Some(&*self.name)), ("serial", serial), ("mode", mode)];
@@ -99,7 +100,7 @@ impl Sensor {
     }
 }
 
-/// A frame that can be read when it is needed.
+/// A frame that is read on demand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameRef {
     /// Seconds, one clock for the whole recording.
@@ -111,12 +112,12 @@ pub struct FrameRef {
 }
 
 impl FrameRef {
-    /// An image with a file of its own.
+    /// A frame in an image file of its own.
     pub fn file(timestamp: f64, path: PathBuf) -> Self {
         FrameRef { timestamp, path, within: None }
     }
 
-    /// Where it is, for people.
+    /// Human-readable location.
     pub fn place(&self) -> String {
         let file = self.path.display();
         match &self.within {
@@ -139,19 +140,19 @@ impl PartialEq for Within {
     }
 }
 
-/// A file that holds many depth frames. It reads one when it is asked for, from any thread, and keeps
-/// no more than a few.
+/// A file that holds many depth frames. Reads them on demand, from any thread, and keeps only a few in
+/// memory.
 pub trait FrameStore: std::fmt::Debug + Send + Sync {
-    /// An error, with the place, when the frame is damaged.
+    /// Reads a frame. Fails, naming the place, when it is damaged.
     fn frame(&self, index: usize) -> Result<Frame>;
-    /// Where a frame stands in the file: its topic and number.
+    /// Location of a frame in the file: its topic and number.
     fn place(&self, index: usize) -> String;
 }
 
 /// One still pose of target and sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// The folder's name, or the file's or the stretch's where a view has no folder.
+    /// Name of the folder, or of the file or stretch where a view has no folder.
     pub name: String,
     /// Depth frames in time order.
     pub depth: Vec<FrameRef>,
@@ -160,7 +161,7 @@ pub struct View {
     pub notes: ViewNotes,
 }
 
-/// Views in name order, their frames not yet read.
+/// A sensor and its views in name order, with frames not yet read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The folder it was opened from.
@@ -169,15 +170,15 @@ pub struct Recording {
     /// The views that could be opened.
     pub views: Vec<View>,
     pub excluded: Vec<Excluded>,
-    /// What was found odd while opening.
+    /// Oddities found while opening.
     pub remarks: Vec<String>,
     /// Files that describe the recording (not the frames), for provenance.
     pub described_by: Vec<PathBuf>,
 }
 
 impl Recording {
-    /// What `of` makes of the views, all at once and in their order; with why of the others nothing came,
-    /// after what was excluded before. `progress` counts views.
+    /// Applies `of` to all views in parallel. Returns the results in order, and the excluded views: those
+    /// excluded before, then those for which `of` failed. `progress` counts views.
     pub fn each_view<'a, T: Send>(
         &'a self,
         progress: Progress<'_>,
@@ -212,13 +213,14 @@ pub struct Excluded {
 impl Excluded {
     pub(crate) fn of(view: &str, error: &crate::error::Error) -> Self {
         let text = error.to_string();
-        // The view's name has its own field.
+        // The view name has its own field.
         let reason = text.strip_prefix(&format!("view {view}: ")).unwrap_or(&text);
         Excluded { view: view.into(), reason: reason.into() }
     }
 }
 
-/// Takes out views that are the `same` as one before them: each copy, and the place of that one among those kept.
+/// Removes views that are the `same` as an earlier one. Returns each copy, with its original's index among
+/// the views kept.
 pub(crate) fn take_out_copies<T>(
     views: &mut Vec<T>,
     same: impl Fn(&T, &T) -> bool,

@@ -1,11 +1,11 @@
-//! The uncertainty budgets of a calibration (GUM), from what the recording states and the views show.
+//! Uncertainty budgets of a calibration (GUM), from what the recording states and the views show.
 
 use crate::measure::{ViewMeasurement, flatness_uncertainty_m};
 use crate::model::{Conditions, NO_ACCEPTANCE_TEST, SigmaModel, Uncertainty, ViewUncertainty};
 use crate::stats::{Budget, COVERAGE_FACTOR, Component, Distribution, range};
 use crate::view::{Recording, Sensor, View, ViewNotes};
 
-/// Budgets of all views; nothing where the recording states no uncertainty at all, for statistics of the
+/// Budgets of all views; `None` where the recording states no uncertainty at all, since statistics of the
 /// readings alone are no budget.
 pub fn uncertainty_of(
     recording: &Recording,
@@ -36,7 +36,7 @@ pub fn uncertainty_of(
 
 const KEYS: usize = 3;
 
-/// The keys that are missing, in all views or some, and whether they are there in any.
+/// The keys missing in at least one view, and whether any view has them.
 fn not_stated(sensor: &Sensor, views: &[(&ViewMeasurement, &View)]) -> Vec<(&'static str, bool)> {
     let stated = |of: &dyn Fn(&ViewNotes) -> bool| {
         let count = views.iter().filter(|(_, v)| of(&v.notes)).count();
@@ -51,7 +51,7 @@ fn not_stated(sensor: &Sensor, views: &[(&ViewMeasurement, &View)]) -> Vec<(&'st
     keys.into_iter().filter(|(_, [_, all])| !all).map(|(key, [any, _])| (key, any)).collect()
 }
 
-/// Of a view's spatial sigma as a value of the noise at its distance and tilt.
+/// Budget of a view's spatial sigma, taken as the noise at its distance and tilt.
 fn sigma_budget(
     m: &ViewMeasurement,
     notes: &ViewNotes,
@@ -63,15 +63,15 @@ fn sigma_budget(
     let mut components =
         vec![Component::type_a("scatter of the readings", whole.std_error_m, whole.n_effective)];
     if let Some(flatness) = notes.target.and_then(|t| t.flatness_m) {
-        // The board's own shape can only have made sigma larger. It is not taken off: half the width of
-        // the interval is the whole of it (GUM F.2.4.5).
+        // The board's own shape can only have made sigma larger. It is not subtracted; the whole of it
+        // counts as half the width of the interval (GUM F.2.4.5).
         let without = (sigma * sigma - flatness_uncertainty_m(flatness).powi(2)).max(0.0).sqrt();
         let u = (sigma - without) / 3f64.sqrt();
         components.push(Component::type_b("flatness of the target", Distribution::Rectangular, u));
     }
     let stated = sensor.intrinsics_uncertainty.as_ref();
     if let Some([across, down]) = stated.and_then(|i| i.focal_relative(&sensor.camera)) {
-        // The slope of the plane goes with the focal length: d theta = sin theta cos theta d f/f.
+        // The slope of the plane scales with the focal length: d theta = sin theta cos theta d f/f.
         let (sin, cos) = m.azimuth_rad.sin_cos();
         let (theta, z) = (m.theta_rad, m.z_m);
         let u = theta.sin() * theta.cos() * (cos * cos * across).hypot(sin * sin * down);
@@ -81,7 +81,7 @@ fn sigma_budget(
     Budget::of(sigma, components)
 }
 
-/// d sigma/d theta of the model, m/rad.
+/// Derivative of the model's sigma by theta, m/rad.
 fn slope_in_tilt(model: &SigmaModel, z: f64, theta: f64) -> f64 {
     const STEP_RAD: f64 = 1e-3;
     (model.sigma(z, theta + STEP_RAD) - model.sigma(z, theta - STEP_RAD)) / (2.0 * STEP_RAD)

@@ -14,7 +14,7 @@ fn a_usable_lens_gives_back_every_pixel() {
             let (pu, pv) = camera.project(x, y);
             assert!((pu - u as f64).hypot(pv - v as f64) < 1e-8, "{k:?}: {pu} {pv}");
         }
-        // Those that start from their neighbours are the same.
+        // Rays whose search starts from their neighbours are the same.
         let rays = camera.rays();
         for i in (0..rays.x.len()).step_by(97) {
             let (x, y) = camera.ray((i % 640) as f64, (i / 640) as f64);
@@ -24,8 +24,8 @@ fn a_usable_lens_gives_back_every_pixel() {
     }
 }
 
-/// Places between the pixels that Newton's method does not find from the bent place at once (found by
-/// chance, by tests/product/degenerate.rs), and a lens of which it does not find some at all.
+/// Places between the pixels that Newton's method does not find directly from the distorted place (found by
+/// chance, by tests/product/degenerate.rs), and a lens for which it does not find some at all.
 #[test]
 fn a_lens_that_bends_much_gives_back_what_lies_between_the_pixels() {
     let k = [0.304682, -0.2622173, 0.0999, -0.0999, 0.1737139];
@@ -69,8 +69,8 @@ fn swapped_and_misplaced_numbers_are_named() {
     }
 }
 
-/// A barrel whose bent radius r (1 - 0.8 r^2) never reaches the corners (0.69): it ends at
-/// r = 1/sqrt(2.4) with 0.43.
+/// Barrel distortion whose radius r (1 - 0.8 r^2) never reaches the corners (0.69): its maximum is 0.43,
+/// at r = 1/sqrt(2.4).
 #[test]
 fn a_lens_that_does_not_reach_the_corners_is_named() {
     let camera = behind([-0.8, 0.0, 0.0, 0.0, 0.0]);

@@ -3,7 +3,7 @@
 use super::guide::Guide;
 use super::wanted::{Pose, WantedView};
 
-/// Something to do.
+/// One instruction.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Advice {
     /// To be read from afar: capitals, digits, and `+-°`.
@@ -16,7 +16,7 @@ impl Advice {
         Advice { word: word.into(), sentence: sentence.into() }
     }
 
-    /// For the guide's present state.
+    /// Advice for the guide's current state.
     pub fn of(guide: &Guide) -> Self {
         if let Some((_, kept)) = guide.taking() {
             let of = guide.shutter().frames;
@@ -35,7 +35,7 @@ impl Advice {
         }
     }
 
-    /// The first thing that is not yet right: distance, tilt, direction.
+    /// The first of distance, tilt and direction that is not right yet.
     fn towards(view: &WantedView, pose: &Pose) -> Self {
         let z_m = view.pose.z_m - pose.z_m;
         let degrees = (view.pose.theta_rad - pose.theta_rad).to_degrees();
@@ -59,7 +59,7 @@ impl Advice {
     }
 }
 
-/// Which side of the target is farther away, as the picture shows it, by eighths of a turn.
+/// Side of the target that is farther away, as seen in the image, in eighths of a turn.
 pub fn far_side(azimuth_rad: f64) -> &'static str {
     const SIDES: [&str; 8] = [
         "right",

@@ -8,11 +8,11 @@ use super::wanted::{Pose, Tolerance, Wanted, WantedView};
 use crate::error::{Error, Result};
 use crate::read::{plainly, read_json};
 
-/// What of `diagnosis.json` matters here.
+/// The part of `diagnosis.json` that is used here.
 #[derive(Deserialize)]
 struct Diagnosis {
     findings: Vec<Finding>,
-    /// The views it has seen.
+    /// Views that were diagnosed.
     #[serde(default)]
     views: Vec<KnownView>,
 }
@@ -36,9 +36,9 @@ struct KnownView {
 }
 
 impl Wanted {
-    /// The views that a diagnosis asks for (`diagnosis.json`). A view that it has seen already is
-    /// not the one it asks for: another at the same pose is numbered.
-    /// An error when it is no diagnosis, advises nothing, or a pose that cannot be.
+    /// The views that a diagnosis asks for (`diagnosis.json`). A view that it has already seen does not count
+    /// as taken: a new one at the same pose gets a number.
+    /// Fails if the file is not a diagnosis, advises nothing, or advises an impossible pose.
     pub fn advised(path: &Path) -> Result<Self> {
         let text = read_json(path)?;
         let remedy = "give the diagnosis.json that kinoise diagnose wrote";
@@ -74,7 +74,7 @@ impl Wanted {
     }
 }
 
-/// `name`, or `name-2` and on, whichever is none of the views seen.
+/// `name`, or `name-2` and so on: the first that is not among the views seen.
 fn unseen(name: &str, seen: &[KnownView]) -> String {
     let is_new = |candidate: &String| seen.iter().all(|v| v.name != *candidate);
     let numbered = (2..seen.len() + 3).map(|n| format!("{name}-{n}"));

@@ -1,28 +1,28 @@
-//! Is the sensor still warming up? While nothing moves, its plane should not either.
+//! Detects warm-up drift: while nothing moves, the measured plane should not move either.
 
-/// The shortest stretch of stillness that shows a drift, s.
+/// Shortest still period that shows a drift, s.
 const MIN_S: f64 = 20.0;
-/// A drift below this is none, m/min at 1 m (it grows as z^2): in the half hour that a session
-/// lasts it stays below a Kinect's sigma there (Khoshelham and Elberink: 1.4 mm z^2).
+/// Smallest drift that counts, m/min at 1 m (it grows as z^2): in the half hour that a session lasts it adds
+/// up to about a Kinect's sigma there (Khoshelham and Elberink: 1.4 mm z^2).
 const MIN_DRIFT_M_PER_MINUTE: f64 = 5e-5;
-/// ... and so is one below this many standard errors.
+/// ... and it must exceed this many standard errors.
 const MIN_STD_ERRORS: f64 = 4.0;
 
-/// How the plane wanders.
+/// Apparent drift of a still plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// Of the depth on the optical axis, m/min; positive when the plane seems to recede.
+    /// Drift of the depth on the optical axis, m/min; positive if the plane seems to recede.
     pub per_minute_m: f64,
-    /// m/min.
+    /// Its standard error, m/min.
     pub std_error_m: f64,
-    /// Where the plane stands, m.
+    /// Depth of the plane, m.
     pub z_m: f64,
-    /// How long it was watched, s.
+    /// Observation time, s.
     pub seconds: f64,
 }
 
 impl Drift {
-    /// Is the sensor still warming up?
+    /// Whether the sensor is still warming up.
     pub fn is_warming(&self) -> bool {
         let size = self.per_minute_m.abs();
         size > MIN_STD_ERRORS * self.std_error_m
@@ -39,8 +39,8 @@ pub struct DriftMonitor {
 }
 
 impl DriftMonitor {
-    /// One frame. The drift is reported after 20 s of stillness, and again whenever the time has
-    /// doubled.
+    /// Adds one frame. The drift is reported after 20 s of stillness, and again
+    /// whenever the time has doubled.
     pub fn add(&mut self, stamp: f64, inverse_depth: f64) -> Option<Drift> {
         self.points.push((stamp, inverse_depth));
         let seconds = stamp - self.points[0].0;
@@ -51,7 +51,7 @@ impl DriftMonitor {
         self.drift()
     }
 
-    /// As far as is known.
+    /// The drift so far, if there is enough data.
     pub fn drift(&self) -> Option<Drift> {
         let seconds = self.points.last()?.0 - self.points[0].0;
         let n = self.points.len() as f64;

@@ -9,9 +9,9 @@ use crate::error::{Error, Result};
 use crate::io::{Assumed, describe_folder, entries, read_depth, size_of};
 use crate::view::{FrameRef, Sensor};
 
-/// How often the folder is looked at.
+/// Polling interval of the folder.
 const POLL: Duration = Duration::from_millis(30);
-/// An unreadable file younger than this is still being written.
+/// An unreadable file younger than this counts as still being written.
 const MAX_WRITING: Duration = Duration::from_secs(2);
 
 /// 16-bit PNGs, or a dump's d-*.pgm, in the folder itself or in its `depth` folder.
@@ -19,15 +19,15 @@ pub struct Growing {
     root: PathBuf,
     sensor: Sensor,
     seen: BTreeSet<PathBuf>,
-    /// Not read yet, the oldest last.
+    /// Images not read yet, oldest last.
     waiting: Vec<PathBuf>,
     remarks: Vec<String>,
 }
 
 impl Growing {
-    /// Wait for the first image for at most `patience`, as it has the frames' size. Images that
-    /// are there already are frames too.
-    /// An error when there is no such folder, no image comes, or the intrinsics are not known.
+    /// Waits at most `patience` for the first image, which gives the frame size. Images
+    /// that already exist are frames too.
+    /// Fails if there is no such folder, no image arrives, or the intrinsics are unknown.
     pub fn open(root: &Path, assumed: &Assumed, patience: Duration) -> Result<Self> {
         if !root.is_dir() {
             let remedy = "start the program that fills it first, or make it";
@@ -39,7 +39,7 @@ impl Growing {
         Ok(Growing { root: root.into(), sensor, seen, waiting: Vec::new(), remarks })
     }
 
-    /// The next image, when it can be read; younger ones wait for it.
+    /// The next image once it can be read; later ones wait for it.
     fn frame(&mut self) -> Option<LiveFrame> {
         if self.waiting.is_empty() {
             self.waiting = images(&self.root);
@@ -90,7 +90,7 @@ fn first_image(root: &Path, patience: Duration) -> Result<PathBuf> {
     })
 }
 
-/// Look again and again until there is something, for so long.
+/// Calls `look` repeatedly until it returns something, for at most `wait`.
 fn poll<T>(wait: Duration, mut look: impl FnMut() -> Option<T>) -> Option<T> {
     let begun = Instant::now();
     loop {

@@ -1,61 +1,61 @@
-//! Decides what becomes of every frame: sightings in, events out; it knows neither disk nor screen.
+//! Decides what to do with every frame: sightings in, events out, without access to disk or screen.
 
 use super::drift::{Drift, DriftMonitor};
 use super::wanted::{Pose, ViewState, Wanted, WantedView};
 use super::watch::Sighting;
 
-/// A target may wander by this much, root mean square of inverse depth, and still be still, 1/m:
-/// two thirds of a step of a Kinect's raw values, 2 mm at 1 m and 8 mm at 2 m.
+/// Largest movement that counts as still, root mean square of inverse depth, 1/m: two thirds of a step of a
+/// Kinect's raw values, 2 mm at 1 m and 8 mm at 2 m.
 const MAX_STILL_PER_M: f64 = 0.002;
 
 /// How views are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shutter {
-    /// Frames of a view.
+    /// Frames per view.
     pub frames: usize,
-    /// Frames for which the target must have been still before.
+    /// Frames for which the target must have been still before a view begins.
     pub hold: usize,
 }
 
-/// What is to be done about a frame, and what there is to report.
+/// What to do with a frame, and what to report.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
     /// A view begins with this frame.
     Begun(String),
     /// This frame belongs to the view.
     Keep,
-    /// The view is whole.
+    /// The view is complete.
     Finished(String),
-    /// The view must be thrown away.
+    /// The view must be discarded.
     Abandoned { view: String, why: String },
-    /// A view that was whole must be thrown away: a person said so, and it is wanted again.
+    /// A complete view must be discarded at the user's request, and is wanted again.
     Rejected(String),
-    /// The plane was watched long enough.
+    /// The plane was watched long enough for a drift estimate.
     Drift(Drift),
-    /// Nothing is wanted any more.
+    /// No more views are wanted.
     Done,
 }
 
-/// What a person can ask for.
+/// A user command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
-    /// Throw the last view away and take it again.
+    /// Discard the last view and take it again.
     Again,
-    /// Go without the view that is being taken or, while none is, the one that is suggested.
+    /// Give up the view being taken or, if there is none, the suggested one.
     Skip,
-    /// That will do.
+    /// End the capture.
     Quit,
 }
 
-/// The state between two frames.
+/// The state of a capture between two frames.
 pub struct Guide {
     wanted: Wanted,
     shutter: Shutter,
     sighting: Result<Sighting, String>,
-    /// Where the target began to be still, and for how many frames it has been.
+    /// Where the target came to rest, and for how many frames it has been still.
     still: Option<(Sighting, usize)>,
     taking: Option<Taking>,
-    /// Indices of the view to go to and of the one finished last.
+    /// Indices of the suggested view and of the one finished last.
     suggestion: Option<usize>,
     last: Option<usize>,
     drift: DriftMonitor,
@@ -65,7 +65,7 @@ pub struct Guide {
 struct Taking {
     view: usize,
     kept: usize,
-    /// It was added for this pose, and goes when it fails.
+    /// Whether it was added for this pose; if so, it is removed if it fails.
     new: bool,
 }
 
@@ -84,7 +84,7 @@ impl Guide {
         }
     }
 
-    /// One frame, as the watcher saw it.
+    /// Processes one frame, as the watcher saw it.
     pub fn see(&mut self, stamp: f64, sighting: Result<Sighting, String>) -> Vec<Event> {
         let mut events = Vec::new();
         self.sighting = sighting;
@@ -103,7 +103,7 @@ impl Guide {
         events
     }
 
-    /// Is the target where it was? If not, stillness begins anew.
+    /// Whether the target is where it was; if not, stillness starts anew.
     fn is_still(&mut self) -> bool {
         if let (Ok(seen), Some((anchor, frames))) = (&self.sighting, &mut self.still)
             && seen.moved_since(anchor) < MAX_STILL_PER_M
@@ -132,7 +132,7 @@ impl Guide {
         }
     }
 
-    /// A view begins when the target has been still for long enough where one is wanted.
+    /// Begins a view if the target has been still long enough at a wanted pose.
     fn begin(&mut self) -> Option<Taking> {
         let pose = self.pose()?;
         if self.held() < self.shutter.hold {
@@ -143,7 +143,7 @@ impl Guide {
         Some(Taking { view, kept: 0, new: self.wanted.views.len() > before })
     }
 
-    /// Give up the view that is being taken, if one is.
+    /// Abandons the view being taken, if there is one.
     fn abandon(&mut self, why: &str) -> Option<Event> {
         let taking = self.taking.take()?;
         let view = self.name(taking.view);
@@ -153,8 +153,7 @@ impl Guide {
         Some(Event::Abandoned { view, why: why.into() })
     }
 
-    /// Keep a suggestion until it is taken or another is much nearer, so that the advice does not
-    /// flicker.
+    /// Keeps a suggestion until it is taken or another is much nearer, so that the advice does not flicker.
     fn suggest(&mut self) {
         let pose = self.pose();
         let best = self.wanted.suggestion(pose.as_ref());
@@ -169,7 +168,7 @@ impl Guide {
         }
     }
 
-    /// Do what a person asks; the events say what must be undone.
+    /// Executes a user command; the events say what must be undone.
     pub fn obey(&mut self, command: Command) -> Vec<Event> {
         match command {
             Command::Again => self.again(),
@@ -178,7 +177,7 @@ impl Guide {
         }
     }
 
-    /// The capture ends here: half a view is none.
+    /// Ends the capture: an incomplete view is abandoned.
     pub fn leave(&mut self) -> Option<Event> {
         self.abandon("stopped")
     }
@@ -207,7 +206,7 @@ impl Guide {
         self.wanted.views[view].name.clone()
     }
 
-    /// What is wanted and what has become of it.
+    /// The wanted views and their states.
     pub fn wanted(&self) -> &Wanted {
         &self.wanted
     }
@@ -217,28 +216,28 @@ impl Guide {
         &self.sighting
     }
 
-    /// Where the target is.
+    /// Pose of the target, if it is seen.
     pub fn pose(&self) -> Option<Pose> {
         self.sighting.as_ref().ok().map(Sighting::pose)
     }
 
-    /// Frames for which it has been still.
+    /// Number of frames for which it has been still.
     pub fn held(&self) -> usize {
         self.still.as_ref().map_or(0, |(_, frames)| *frames)
     }
 
-    /// How far it has moved since it began to be still, m at its distance.
+    /// How far it has moved since it came to rest, as a change of depth, m.
     pub fn moved_m(&self) -> Option<f64> {
         let (Ok(seen), Some((anchor, _))) = (&self.sighting, &self.still) else { return None };
         Some(seen.moved_since(anchor) * seen.pose().z_m.powi(2))
     }
 
-    /// The view that is being taken, and how many frames of it are there.
+    /// The view being taken, and the number of its frames so far.
     pub fn taking(&self) -> Option<(&str, usize)> {
         self.taking.map(|t| (self.wanted.views[t.view].name.as_str(), t.kept))
     }
 
-    /// Which of the wanted views to go to.
+    /// The wanted view to go to next.
     pub fn suggestion(&self) -> Option<&WantedView> {
         self.wanted.views.get(self.suggestion?)
     }
@@ -247,7 +246,7 @@ impl Guide {
         self.shutter
     }
 
-    /// Of the present stillness.
+    /// Drift during the current still period.
     pub fn drift(&self) -> Option<Drift> {
         self.drift.drift()
     }

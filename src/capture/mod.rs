@@ -1,4 +1,4 @@
-//! Views taken from a running sensor, guided to those that are still wanted.
+//! Takes views from a running sensor and guides the user to those that are still wanted.
 //!
 //! ```text
 //! Source -> LiveFrame -> Watcher -> Sighting -> Guide -> Event -> Session (disk), Interface (people)

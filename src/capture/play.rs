@@ -1,4 +1,4 @@
-//! A recording played back as if its sensor stood here.
+//! Plays a recording back as if from a live sensor.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -17,7 +17,7 @@ pub struct Playback {
     sensor: Sensor,
     frames: std::vec::IntoIter<(FrameRef, Option<FrameRef>)>,
     images: FrameSource,
-    /// Play at the recording's own pace, not as fast as frames can be read.
+    /// Whether to play at the recording's own pace, not as fast as frames can be read.
     paced: bool,
     previous: Option<(f64, Instant)>,
     root: PathBuf,
@@ -25,8 +25,8 @@ pub struct Playback {
 }
 
 impl Playback {
-    /// Open any layout that kinoise reads.
-    /// Errors as those of [`crate::io::open`].
+    /// Opens any layout that kinoise reads.
+    /// Fails as [`crate::io::open`] does.
     pub fn open(root: &Path, assumed: &Assumed, paced: bool) -> Result<Self> {
         let recording = open_uncut(root, assumed)?;
         let mut frames: Vec<(FrameRef, Option<FrameRef>)> = Vec::new();
@@ -52,7 +52,7 @@ impl Playback {
         })
     }
 
-    /// An infrared image of the depth frame's size, or none.
+    /// Infrared image of the depth frame's size; `None`, with a remark, if it cannot be read.
     fn amplitude(&mut self, path: &Path, depth: &Frame) -> Option<Frame> {
         match InfraredImage::read(path, [depth.width, depth.height]) {
             Ok(InfraredImage { width, height, amplitude }) => {

@@ -1,4 +1,4 @@
-//! The loop: a frame comes, is looked at, and what the guide says about it is done.
+//! The capture loop: takes a frame, analyses it, and does what the guide decides.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -10,55 +10,55 @@ use super::watch::Watcher;
 use crate::error::{Error, Result};
 use crate::view::ViewNotes;
 
-/// Where people follow a capture and steer it: a screen with keys, or a log.
+/// User interface of a capture: a screen with keys, or a log.
 pub trait Interface {
-    /// Something happened, and the guide knows of it.
+    /// Something happened that the guide already knows of.
     fn event(&mut self, event: &Event, guide: &Guide);
 
-    /// A frame was dealt with.
+    /// A frame was processed.
     fn frame(&mut self, _guide: &Guide) {}
 
-    /// There has been no frame for so long.
+    /// No frame has arrived for this long.
     fn waiting(&mut self, _guide: &Guide, _silence: Duration) {}
 
-    /// What a person asks for, if anything.
+    /// The next user command, if any.
     fn command(&mut self) -> Option<Command> {
         None
     }
 }
 
-/// How a capture came to its end.
+/// How a capture ended.
 #[derive(Debug)]
 pub enum Ending {
-    /// Nothing is wanted any more.
+    /// No more views are wanted.
     Complete,
     /// By a key.
     Quit,
     /// By a signal.
     Interrupted,
-    /// The source ended before all was taken.
+    /// The source ended before all views were taken.
     Ended(End),
-    /// No frame for so long.
+    /// No frame arrived for this long.
     Stalled(Duration),
     /// The disk failed.
     Failed(Error),
 }
 
-/// What was done.
+/// Result of a capture.
 #[derive(Debug)]
 pub struct Outcome {
     pub ending: Ending,
     /// Views finished in this run, in order.
     pub finished: Vec<String>,
-    /// Frames looked at.
+    /// Frames processed.
     pub frames: usize,
 }
 
-/// How long one wait for a frame lasts: keys are answered between two.
+/// Duration of one wait for a frame; keys are answered between waits.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// Take views until nothing is wanted, or something ends it, such as `stop` (Ctrl-C). Finished views
-/// are kept whatever happens; `patience` is how long a stream may stand still.
+/// Takes views until none is wanted or something ends the capture, such as `stop` (Ctrl-C). Finished views
+/// are always kept; `patience` is how long a stream may stall.
 pub fn capture(
     source: &mut dyn Source,
     session: &mut Session,
@@ -78,7 +78,7 @@ pub fn capture(
         }
         match run.step(source, patience) {
             Ok(None) => {}
-            // A signal may have woken the library.
+            // A signal may have interrupted the library.
             Ok(Some(Ending::Ended(_))) if stopped() => break Ending::Interrupted,
             Ok(Some(ending)) => break ending,
             Err(e) => break Ending::Failed(e),
@@ -101,7 +101,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Answer a key, then look at a frame; does either end the capture?
+    /// Handles a key, then a frame. Returns the ending if either ends the capture.
     fn step(&mut self, source: &mut dyn Source, patience: Duration) -> Result<Option<Ending>> {
         if let Some(command) = self.interface.command() {
             let events = self.guide.obey(command);
@@ -134,7 +134,7 @@ impl Run<'_> {
         Ok(events.contains(&Event::Done).then_some(Ending::Complete))
     }
 
-    /// Do what the events say.
+    /// Carries out the events.
     fn act(&mut self, events: &[Event], frame: Option<&LiveFrame>) -> Result<()> {
         for event in events {
             match event {
@@ -157,7 +157,7 @@ impl Run<'_> {
     }
 }
 
-/// The next frame; of a live sensor, the newest, unless every one is wanted.
+/// The next frame; from a live sensor the newest, unless `every` frame is wanted.
 fn newest(source: &mut dyn Source, every: bool) -> Arrival {
     let mut arrival = source.next(WAIT);
     while source.live() && !every && matches!(arrival, Arrival::Frame(_)) {

@@ -6,11 +6,11 @@ use super::advice::{Advice, far_side};
 use super::guide::Guide;
 use super::wanted::{ViewState, Wanted, WantedView};
 
-/// How a line stands out.
+/// How a line is emphasised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     Plain,
-    /// What to do.
+    /// The instruction.
     Loud,
     /// A view was just taken: the whole screen flashes.
     Flash,
@@ -23,7 +23,7 @@ pub struct Line {
     pub style: Style,
 }
 
-/// What the screen shows beside the guide's state.
+/// What the screen shows besides the guide's state.
 #[derive(Debug, Clone, Default)]
 pub struct Status {
     /// The recording and its sensor.
@@ -32,7 +32,7 @@ pub struct Status {
     pub flash: Option<String>,
     /// The latest message.
     pub news: String,
-    /// Seconds without a frame, when it has been long.
+    /// Seconds since the last frame, if that is long.
     pub silent_s: Option<u64>,
 }
 
@@ -72,11 +72,11 @@ pub fn render(guide: &Guide, status: &Status, columns: usize, rows: usize) -> Ve
     lines
 }
 
-/// Dots of a letter, across and down.
+/// Dots per letter, across and down.
 const DOTS: usize = 8;
 
-/// The text in big letters, two dots above each other in a character; as it is where it does not
-/// fit into `columns`. Letters that are not in the font are left out.
+/// Text in big letters, with two vertical dots per character; unchanged if it is wider than `columns`.
+/// Characters missing from the font are omitted.
 fn big(text: &str, columns: usize) -> Vec<String> {
     let letter = |c| BASIC_FONTS.get(c).or_else(|| LATIN_FONTS.get(c));
     let letters: Vec<[u8; DOTS]> = text.chars().filter_map(letter).collect();
@@ -102,7 +102,7 @@ fn pose(guide: &Guide) -> String {
         .map_or("-".into(), |pose| format!("{:.2}M {:.0}°", pose.z_m, pose.theta_rad.to_degrees()))
 }
 
-/// How still, and how warm.
+/// Stillness and warm-up drift.
 fn stillness(guide: &Guide) -> String {
     let Some(moved) = guide.moved_m() else { return "no board".into() };
     let hold = guide.shutter().hold.max(1);
@@ -154,10 +154,10 @@ fn table(wanted: &Wanted, next: Option<&WantedView>) -> Vec<String> {
     std::iter::once(format!("{:8}{head}", "")).chain(lines).collect()
 }
 
-/// Lines of a list: as many as the paper's grid has.
+/// Longest list: as many lines as the paper's grid has.
 const MAX_LISTED: usize = 8;
 
-/// Open ones first, as they stand; then the last that were taken.
+/// Open views first, in list order; then the others, latest first.
 fn list(wanted: &Wanted, next: Option<&WantedView>) -> Vec<String> {
     let line = |v: &WantedView| {
         let side = if v.is_directed() { far_side(v.pose.azimuth_rad) } else { "" };

@@ -1,4 +1,4 @@
-//! A recording on the disk that grows view by view: each is whole or not there.
+//! A recording on the disk that grows view by view; each view is complete or absent.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -11,13 +11,13 @@ use crate::io::{
 };
 use crate::view::{Sensor, ViewNotes};
 
-/// Unfinished views stand in here; readers look for a depth list one level higher.
+/// Folder of unfinished views; readers look for a depth list one level higher.
 const PARTIAL: &str = ".partial";
-/// Prefix of a view that is being replaced, until the new one stands.
+/// Prefix of a view that is being replaced, until the new one is in place.
 const OLD: &str = "old-";
 /// Prefix of a rejected view that is being removed.
 const REJECTED: &str = "bad-";
-/// One capture at a time.
+/// Error if another capture has locked the recording.
 const TAKEN: [&str; 2] = [
     "another capture is writing into it",
     "end that one first (q, or Ctrl-C), or choose a new folder",
@@ -35,14 +35,14 @@ struct PartialView {
     name: String,
     folder: PathBuf,
     frames: usize,
-    /// Images of a kind have a folder of that name, and the list that names them.
+    /// Kind of image, which names its folder, and the list of these images.
     lists: [(&'static str, String); 2],
 }
 
 impl Session {
-    /// Begin a recording in a new or empty folder, or go on with the one that is there.
-    /// An error when something else is in the folder, another sensor took what is there, another capture
-    /// is writing into it, or it cannot be written.
+    /// Begins a recording in a new or empty folder, or resumes the one that is there.
+    /// Fails if something else is in the folder, another sensor took the existing views, another capture is
+    /// writing into it, or it cannot be written.
     pub fn open(root: &Path, sensor: &Sensor) -> Result<Self> {
         if root.exists() && !root.is_dir() {
             let remedy = "choose a new folder for the recording";
@@ -63,7 +63,8 @@ impl Session {
         Ok(session)
     }
 
-    /// Put right what an interrupted run left: half views go, a view that was being replaced stays.
+    /// Cleans up after an interrupted run: incomplete views are removed, a view that
+    /// was being replaced is restored.
     fn recover(&mut self) -> Result<()> {
         let partial = self.root.join(PARTIAL);
         if !partial.is_dir() {
@@ -85,20 +86,20 @@ impl Session {
         fs::remove_dir_all(&partial).map_err(|e| failed(&partial, e))
     }
 
-    /// What was found and done while opening, each a sentence.
+    /// What was found and done while opening, one sentence each.
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
 
-    /// Names of the views that are whole.
-    /// An error when the folder cannot be read.
+    /// Names of the complete views.
+    /// Fails if the folder cannot be read.
     pub fn taken(&self) -> Result<Vec<String>> {
         let whole = entries(&self.root)?.into_iter().filter(|p| p.join(DEPTH_LIST).is_file());
         Ok(whole.filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect())
     }
 
-    /// Begin a view.
-    /// An error when its folder cannot be made.
+    /// Begins a view.
+    /// Fails if its folder cannot be created.
     pub fn begin(&mut self, name: &str) -> Result<()> {
         self.abandon();
         let folder = self.root.join(PARTIAL).join(name);
@@ -108,14 +109,14 @@ impl Session {
         Ok(())
     }
 
-    /// Add a frame to the view that was begun.
-    /// An error when it cannot be written.
+    /// Adds a frame to the view that was begun.
+    /// Fails if it cannot be written.
     pub fn keep(&mut self, frame: &LiveFrame) -> Result<()> {
         self.partial.as_mut().map_or(Ok(()), |view| view.keep(frame))
     }
 
-    /// The view is whole: put it where it belongs, in place of one of that name.
-    /// An error when it cannot be written; an older view of that name then stands as it stood.
+    /// Completes the view and moves it to its place, replacing any view of that name.
+    /// Fails if it cannot be written; an older view of that name is then kept.
     pub fn finish(&mut self, notes: &ViewNotes) -> Result<()> {
         let Some(view) = &self.partial else { return Ok(()) };
         view.close(notes)?;
@@ -138,8 +139,8 @@ impl Session {
         sync(&self.root)
     }
 
-    /// Throw a whole view away, at once: it shall not count as taken, however this run ends.
-    /// An error when it cannot be moved; it then stands as it stood.
+    /// Discards a complete view at once: it must not count as taken, however this run ends.
+    /// Fails if it cannot be moved; it is then kept.
     pub fn reject(&mut self, name: &str) -> Result<()> {
         let partial = self.root.join(PARTIAL);
         fs::create_dir_all(&partial).map_err(|e| failed(&partial, e))?;
@@ -149,7 +150,7 @@ impl Session {
         sync(&self.root)
     }
 
-    /// Throw the view that was begun away.
+    /// Discards the view that was begun.
     pub fn abandon(&mut self) {
         if let Some(view) = self.partial.take() {
             let _ = fs::remove_dir_all(view.folder);
@@ -160,7 +161,7 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         self.abandon();
-        // Fails, rightly, when an old view stands in it.
+        // Fails, rightly, if an old view is still in it.
         let _ = fs::remove_dir(self.root.join(PARTIAL));
     }
 }
@@ -170,7 +171,7 @@ impl PartialView {
         let images = [frame.infrared.as_ref(), Some(&frame.depth)];
         for ((kind, list), image) in self.lists.iter_mut().zip(images) {
             let Some(image) = image else { continue };
-            // Both images of a moment have the depth's number.
+            // Infrared images carry the number of their depth image.
             let path = format!("{kind}/{:04}.png", self.frames);
             let (folder, file) = (self.folder.join(kind), self.folder.join(&path));
             fs::create_dir_all(&folder).map_err(|e| failed(&folder, e))?;
@@ -181,7 +182,7 @@ impl PartialView {
         Ok(())
     }
 
-    /// Everything on the disk itself, the list of the depth frames last.
+    /// Writes everything to the disk, the list of the depth frames last.
     fn close(&self, notes: &ViewNotes) -> Result<()> {
         write_view_notes(&self.folder, notes)?;
         for (kind, list) in self.lists.iter().filter(|(_, list)| !list.is_empty()) {
@@ -197,7 +198,7 @@ impl PartialView {
     }
 }
 
-/// A recording is resumed with the sensor that it was begun with.
+/// Fails unless a recording is resumed with the sensor that it was begun with.
 fn refuse_another(description: &Path, now: &Sensor) -> Result<()> {
     let before = read_description(description)?;
     let refuse = |what: String| {
@@ -217,7 +218,7 @@ fn refuse_another(description: &Path, now: &Sensor) -> Result<()> {
     Ok(())
 }
 
-/// To the disk itself.
+/// Flushes a file or a folder to the disk.
 fn sync(path: &Path) -> Result<()> {
     let synced = if path.is_dir() {
         sync_folder(path)

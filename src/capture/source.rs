@@ -1,57 +1,57 @@
-//! Where frames come from while views are taken.
+//! Sources of frames for a capture.
 
 use std::time::Duration;
 
 use crate::frame::Frame;
 use crate::view::Sensor;
 
-/// One moment of a sensor.
+/// The images of one moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveFrame {
-    /// Seconds; one clock for as long as the source runs.
+    /// Timestamp, s, on one clock for as long as the source runs.
     pub stamp: f64,
     /// In the sensor's raw values.
     pub depth: Frame,
-    /// Infrared amplitude of the same size, where the source has it.
+    /// Infrared amplitude of the same size, if the source has it.
     pub infrared: Option<Frame>,
 }
 
-/// What a source had to give.
+/// Result of waiting for a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Arrival {
     Frame(LiveFrame),
-    /// Nothing in the time allowed; more may come.
+    /// No frame in the time allowed; more may come.
     Nothing,
-    /// Nothing will come any more.
+    /// No more frames will come.
     End(End),
 }
 
-/// Why a source came to its end.
+/// Why a source ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct End {
     pub why: String,
-    /// It went away while it was needed; a recording that was played to its end did not.
+    /// Whether it was lost while needed; a recording played to its end was not.
     pub lost: bool,
 }
 
 /// A sensor, or something that behaves like one.
 pub trait Source {
-    /// The unit, as `recording.json` will describe it.
+    /// The sensor, as `recording.json` will describe it.
     fn sensor(&self) -> &Sensor;
 
-    /// The next frame, waiting for it about `wait` at most.
+    /// Returns the next frame, waiting about `wait` at most.
     fn next(&mut self, wait: Duration) -> Arrival;
 
-    /// Does time go by while nobody asks for frames?
+    /// Whether time passes while nobody asks for frames.
     fn live(&self) -> bool {
         false
     }
 
-    /// Frames that came while there was no room for them.
+    /// Number of frames lost because there was no room for them.
     fn dropped(&self) -> usize {
         0
     }
 
-    /// Oddities met so far, each a sentence.
+    /// Remarks so far, one sentence each.
     fn remarks(&self) -> &[String];
 }

@@ -3,25 +3,25 @@
 use crate::error::{Error, Result};
 use crate::plane::Plane;
 
-/// Where a target stands.
+/// Pose of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Depth of its plane on the optical axis, m.
     pub z_m: f64,
-    /// Between the optical axis and the plane's normal, rad.
+    /// Angle between the optical axis and the plane's normal, rad.
     pub theta_rad: f64,
-    /// Image direction in which depth grows, rad; 0 along the columns, a quarter turn along the
-    /// rows. Means nothing for a target that is seen from the front.
+    /// Image direction in which depth increases, rad; 0 to the right, pi/2 downwards.
+    /// Undefined for a fronto-parallel target.
     pub azimuth_rad: f64,
 }
 
 impl Pose {
-    /// Of a plane.
+    /// Pose of a plane.
     pub fn of(plane: &Plane) -> Self {
         Pose { z_m: plane.depth(0.0, 0.0), theta_rad: plane.theta(), azimuth_rad: plane.azimuth() }
     }
 
-    /// A folder's name: centimetres and degrees, so that names sort by distance.
+    /// Folder name in centimetres and degrees, so that names sort by distance.
     fn name(&self, with_azimuth: bool) -> String {
         let whole = |v: f64| v.round().max(0.0);
         let [cm, degrees] = [100.0 * self.z_m, self.theta_rad.to_degrees()].map(whole);
@@ -34,25 +34,25 @@ impl Pose {
     }
 }
 
-/// Below this tilt a direction means nothing, rad.
+/// Tilt below which the direction is undefined, rad.
 const MIN_DIRECTED_RAD: f64 = 0.1;
 
-/// How near a pose must be to count as the one wanted.
+/// How close a pose must be to the wanted one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     pub z_m: f64,
     pub theta_rad: f64,
-    /// rad; `None` when every direction will do.
+    /// rad; `None` if any direction is accepted.
     pub azimuth_rad: Option<f64>,
 }
 
-/// Four fifths of half the paper's pitch: every cell is hit by hand, and no pose belongs to two.
+/// Four fifths of half the paper's grid spacing: easy to reach by hand, and no pose belongs to two cells.
 const GRID: Tolerance = Tolerance { z_m: 0.2, theta_rad: 0.07, azimuth_rad: None };
-/// Where any pose will do: two that are nearer than this are one view.
+/// For any pose: two poses closer than this are one view.
 const ANY: Tolerance = Tolerance { z_m: 0.05, theta_rad: 0.05, azimuth_rad: Some(0.35) };
 
-/// In order, each once (what two names cannot tell apart is one), and the tolerance: at most `max`,
-/// and the same share of a finer pitch.
+/// Sorted values without duplicates (values that a name cannot tell apart count once), and the tolerance: 0.4
+/// of the finest pitch, but at most `max`.
 fn pitches(values: &[f64], unit: f64, max: f64) -> (Vec<f64>, f64) {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);
@@ -64,23 +64,23 @@ fn pitches(values: &[f64], unit: f64, max: f64) -> (Vec<f64>, f64) {
 /// A view to be taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WantedView {
-    /// The view's folder.
+    /// Name of the view's folder.
     pub name: String,
     pub pose: Pose,
     pub tolerance: Tolerance,
-    /// What it is good for, where a diagnosis asked for it.
+    /// Purpose of the view, if a diagnosis asked for it.
     pub why: Option<String>,
     pub state: ViewState,
 }
 
-/// What has become of a wanted view.
+/// State of a wanted view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ViewState {
     /// Not taken yet, or to be taken again.
     Open,
     /// On the disk.
     Taken,
-    /// Given up by hand.
+    /// Given up by the user.
     Skipped,
 }
 
@@ -90,7 +90,7 @@ impl WantedView {
         WantedView { name, pose, tolerance, why, state: ViewState::Open }
     }
 
-    /// From a name that [`Pose::name`] made.
+    /// Parses a name made by [`Pose::name`].
     fn named(name: &str, tolerance: Tolerance) -> Option<Self> {
         let mut parts = name.split('-');
         let mut number = |letter: char| parts.next()?.strip_prefix(letter)?.parse::<f64>().ok();
@@ -104,7 +104,7 @@ impl WantedView {
         self.state == ViewState::Open
     }
 
-    /// Is a target at `pose` within the tolerance?
+    /// Whether a target at `pose` is within the tolerance.
     pub fn fits(&self, pose: &Pose) -> bool {
         let near = |a: f64, b: f64, within: f64| (a - b).abs() <= within;
         near(pose.z_m, self.pose.z_m, self.tolerance.z_m)
@@ -112,12 +112,12 @@ impl WantedView {
             && self.turn(pose).abs() <= self.tolerance.azimuth_rad.unwrap_or(f64::INFINITY)
     }
 
-    /// Does the direction of its tilt matter?
+    /// Whether the direction of the tilt matters.
     pub fn is_directed(&self) -> bool {
         self.tolerance.azimuth_rad.is_some() && self.pose.theta_rad > MIN_DIRECTED_RAD
     }
 
-    /// How far the direction of the tilt is off, rad in (-pi, pi]; 0 where it does not matter.
+    /// Error of the tilt's direction, rad in (-pi, pi]; 0 if the direction does not matter.
     pub fn turn(&self, pose: &Pose) -> f64 {
         if !self.is_directed() {
             return 0.0;
@@ -126,7 +126,7 @@ impl WantedView {
         sin.atan2(cos)
     }
 
-    /// How far from `pose`, in cells of the paper's grid.
+    /// Distance from `pose`, in cells of the paper's grid.
     pub(super) fn distance(&self, pose: &Pose) -> f64 {
         let z = (pose.z_m - self.pose.z_m) / 0.5;
         let theta = (pose.theta_rad - self.pose.theta_rad) / 10f64.to_radians();
@@ -139,17 +139,17 @@ pub const PAPER_DISTANCES_M: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0];
 /// Tilts of the paper's grid, degrees.
 pub const PAPER_TILTS_DEG: [f64; 9] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
 
-/// The list.
+/// The list of wanted views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wanted {
     pub views: Vec<WantedView>,
-    /// Every new still pose is wanted too.
+    /// Whether every new still pose is wanted too.
     pub any: bool,
 }
 
 impl Wanted {
-    /// Every distance, m, at every tilt, rad, whatever its direction; whole centimetres and
-    /// degrees, and each once.
+    /// Grid of every distance, m, at every tilt, rad, in any direction. Values that round to the same
+    /// centimetre or degree count once.
     pub fn grid(distances_m: &[f64], tilts_rad: &[f64]) -> Self {
         let (distances, z_m) = pitches(distances_m, 0.01, GRID.z_m);
         let (tilts, theta_rad) = pitches(tilts_rad, 1f64.to_radians(), GRID.theta_rad);
@@ -161,12 +161,12 @@ impl Wanted {
         Wanted { views: views.collect(), any: false }
     }
 
-    /// Whatever holds still and is not there yet.
+    /// Any still pose that has not been taken yet.
     pub fn any() -> Self {
         Wanted { views: Vec::new(), any: true }
     }
 
-    /// Mark what is on the disk already.
+    /// Marks the views that are already on the disk as taken.
     pub fn mark_taken(&mut self, names: &[String]) {
         for name in names {
             if let Some(view) = self.views.iter_mut().find(|v| v.name == *name) {
@@ -178,8 +178,8 @@ impl Wanted {
         }
     }
 
-    /// Want a view again that is among those `taken`.
-    /// An error when there is no such view, or its name does not tell its pose.
+    /// Reopens a view among those `taken`, to take it again.
+    /// Fails if there is no such view, or its name does not tell its pose.
     pub fn take_again(&mut self, name: &str, taken: &[String]) -> Result<()> {
         let refuse = |why: &str, remedy: &'static str| Error::Argument {
             what: format!("--retake {name}: {why}"),
@@ -201,7 +201,7 @@ impl Wanted {
         Ok(())
     }
 
-    /// Which open view a target at `pose` would make. In a list of any poses a new one is added.
+    /// Index of the open view that a target at `pose` would make. If any pose is wanted, a new one is added.
     pub fn claim(&mut self, pose: &Pose) -> Option<usize> {
         let near = self.nearest(pose, |v| v.is_open() && v.fits(pose));
         if near.is_some() || !self.any || self.views.iter().any(|v| v.fits(pose)) {
@@ -215,7 +215,7 @@ impl Wanted {
         Some(self.views.len() - 1)
     }
 
-    /// The open view that takes least moving; the first one when nothing is seen.
+    /// The open view that needs the least movement; the first one if no target is seen.
     pub fn suggestion(&self, pose: Option<&Pose>) -> Option<usize> {
         match pose {
             Some(pose) => self.nearest(pose, WantedView::is_open),
@@ -240,7 +240,7 @@ impl Wanted {
         format!("{}{of}", self.count(ViewState::Taken))
     }
 
-    /// Nothing is left to take.
+    /// Whether nothing is left to take.
     pub fn is_done(&self) -> bool {
         !self.any && self.count(ViewState::Open) == 0
     }

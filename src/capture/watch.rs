@@ -1,4 +1,4 @@
-//! Where the target is, frame by frame, quickly enough to follow a hand.
+//! Locates the target frame by frame, fast enough to follow a hand.
 
 use super::wanted::Pose;
 use crate::camera::{Camera, Rays};
@@ -9,20 +9,20 @@ use crate::rng::Seed;
 use crate::stats::range;
 use crate::view::Sensor;
 
-/// Pixels looked at along a row: a Kinect's every second.
+/// Pixels used along a row: every second one of a Kinect's.
 const ACROSS: usize = 320;
-/// A target is followed while so much of it fits as did when it was found.
+/// A target is followed while its share of fitting pixels exceeds this fraction of the initial share.
 const MIN_SHARE_KEPT: f64 = 0.8;
-/// ... and while it fits no worse than this many times.
+/// ... and its residual scale is below this multiple of the initial scale.
 const MAX_SCALE_GROWTH: f64 = 2.0;
-/// Pixels within so many robust standard deviations belong to the plane.
+/// Pixels within this many robust standard deviations belong to the plane.
 const MAX_SUPPORT_SCALES: f64 = 5.0;
 
 /// What one frame shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
     pub plane: Plane,
-    /// Rays (x, y) of the corners of the box around the target.
+    /// Rays (x, y) of the corners of the target's bounding box.
     pub corners: [(f64, f64); 4],
 }
 
@@ -31,8 +31,8 @@ impl Sighting {
         Pose::of(&self.plane)
     }
 
-    /// How far the target has moved since `before`: root mean square over its corners of the
-    /// change of inverse depth, 1/m.
+    /// How far the target has moved since `before`: root mean square over its corners of
+    /// the change of inverse depth, 1/m.
     pub fn moved_since(&self, before: &Sighting) -> f64 {
         let off = |&(x, y): &(f64, f64)| {
             self.plane.inverse_depth(x, y) - before.plane.inverse_depth(x, y)
@@ -47,9 +47,9 @@ pub struct Watcher {
     rays: Rays,
     table: DepthTable,
     code: DepthCode,
-    /// From one step of the sensor to the next; see [`words_a_step`].
+    /// Words per step of the sensor; see [`words_a_step`].
     words_a_step: f64,
-    /// Every how many pixels is looked at, along rows and columns.
+    /// Subsampling factor along rows and columns.
     every: usize,
     columns: usize,
     followed: Option<Followed>,
@@ -59,7 +59,7 @@ pub struct Watcher {
 struct Followed {
     pixels: Vec<u32>,
     sighting: Sighting,
-    /// When it was found: the share of pixels that fit, and their scale, 1/m.
+    /// Share of fitting pixels and their residual scale, 1/m, when the target was found.
     share: f64,
     scale: f64,
 }
@@ -68,7 +68,7 @@ impl Watcher {
     pub fn new(sensor: &Sensor) -> Self {
         let full = &sensor.camera;
         let every = (full.width / ACROSS).max(1);
-        // Pixel i of the small picture is pixel every * i of the large one.
+        // Pixel i of the small image is pixel every * i of the full one.
         let small = |n: usize| n.div_ceil(every);
         let per = |v: f64| v / every as f64;
         let camera = Camera {
@@ -93,8 +93,7 @@ impl Watcher {
         }
     }
 
-    /// The target in this frame, or why there is none.
-    /// An error says why.
+    /// The target in this frame; the error says why there is none.
     pub fn look(&mut self, frame: &Frame) -> Result<Sighting, String> {
         self.take_in(frame);
         let followed = match self.followed.take().and_then(|f| self.follow(f)) {
@@ -116,7 +115,7 @@ impl Watcher {
         sensor_step(&self.code, self.words_a_step, w)
     }
 
-    /// The plane through the pixels that were the target, if they still are.
+    /// Refits the plane to the target's pixels, if they still show the target.
     fn follow(&self, before: Followed) -> Option<Followed> {
         let (plane, share, scale) = self.fit(&before.pixels, &before.sighting.plane)?;
         let good = share > MIN_SHARE_KEPT * before.share && scale < MAX_SCALE_GROWTH * before.scale;
@@ -124,9 +123,9 @@ impl Watcher {
         good.then_some(Followed { sighting, ..before })
     }
 
-    /// Plane, share of the pixels that support it, scale in 1/m.
+    /// Plane, share of the pixels that support it, and residual scale, 1/m.
     fn fit(&self, pixels: &[u32], start: &Plane) -> Option<(Plane, f64, f64)> {
-        // A rounding error spreads over a step with this standard deviation: 1/sqrt(12).
+        // Standard deviation of a rounding error: 1/sqrt(12) of a step.
         let floor = 0.3 * self.step(start.q.z);
         let fit =
             fit_affine_robust(&self.inverse, &self.rays, pixels, start, floor, Effort::AllPixels)?;
@@ -154,7 +153,7 @@ impl Watcher {
     }
 }
 
-/// Of the box around the pixels.
+/// Corners of the bounding box of the pixels.
 fn corners(pixels: &[u32], rays: &Rays) -> [(f64, f64); 4] {
     let at = |i: &u32| rays.at(*i as usize);
     let [left, right] = range(pixels.iter().map(|i| at(i).0));
@@ -168,7 +167,7 @@ mod tests {
     use crate::simulate::kinect_v1;
     use rand_distr::{Distribution, Normal};
 
-    /// A wall at 2 m in steps of 12 mm, two thirds of it in one of them, stored in fifths of a millimetre.
+    /// A wall at 2 m in steps of 12 mm, stored in fifths of a millimetre; two thirds of it lie in one step.
     #[test]
     fn a_wall_in_steps_coarser_than_the_words_is_a_target() {
         let sensor = kinect_v1(2);

@@ -105,13 +105,13 @@ impl Arguments {
         Ok(CalibrateOptions { measure, kind: sigma, form, created })
     }
 
-    /// A file whose name ends in .csv.
+    /// Whether the input is a file whose name ends in .csv.
     fn is_table(&self) -> bool {
         let csv = self.recording.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
         csv && self.recording.is_file()
     }
 
-    /// A table has no frames to measure.
+    /// Refuses the options of the measurement: a table has no frames to measure.
     fn refuse_measuring(&self) -> anyhow::Result<()> {
         let Measuring { sigma, planes, ransac_threshold } = self.measuring;
         let options = [
@@ -148,7 +148,7 @@ pub fn fit(arguments: &FitArguments, global: &Global) -> anyhow::Result<()> {
     table(&arguments.table, &arguments.output, &arguments.fitting, global)
 }
 
-/// Fit to a table alone.
+/// Fits a table and writes the results.
 fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyhow::Result<()> {
     let form = fitting.form()?;
     let options = CalibrateOptions { form, created: source_date(), ..Default::default() };
@@ -170,7 +170,7 @@ fn table(file: &Path, output: &Path, fitting: &Fitting, global: &Global) -> anyh
     Ok(())
 }
 
-/// Measure, fit, write every output, report.
+/// Measures, fits, writes every output and reports.
 pub fn calibrate(
     recording: &Recording,
     options: &CalibrateOptions,
@@ -188,7 +188,7 @@ pub fn calibrate(
     let calibration = match fitted {
         Ok(calibration) => calibration,
         Err(why) => {
-            // Without a model there is no list of warnings: this is the only place to say why.
+            // Without a model there is no list of warnings: these are shown nowhere else.
             notes(&measurements.excluded);
             notes(&recording.remarks);
             let told = measured_only(out)?;
@@ -207,7 +207,8 @@ pub fn calibrate(
     Ok((measurements, calibration))
 }
 
-/// The measurements of views that no model fits, unless they would replace an earlier run's model.
+/// Keeps the measurements of views that no model fits, unless they would replace an earlier run's model.
+/// Returns the message.
 fn measured_only(out: OutputFolder) -> anyhow::Result<String> {
     let place = out.place().to_path_buf();
     if out.replaces() {
@@ -219,8 +220,8 @@ fn measured_only(out: OutputFolder) -> anyhow::Result<String> {
     Ok(format!("the views were measured ({}) but no model was fitted", measurements.display()))
 }
 
-/// Model, figures and page; a summary for people. No model of a fit that explains nothing, unless
-/// forced.
+/// Writes the model, figures and page, and prints a summary. A fit that explains nothing leaves no model
+/// unless forced.
 fn write_outputs(out: OutputFolder, page: &CalibrationPage<'_>) -> anyhow::Result<()> {
     let calibration = page.calibration;
     let (table, sigma) = (&calibration.table, &calibration.model.sigma);

@@ -1,4 +1,4 @@
-//! A calibration in a few lines for people, and as JSON for programs.
+//! A calibration as a few lines of text and as JSON.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use kinoise::units::{counted, decimals};
 use kinoise::{Calibration, SigmaModel};
 use serde_json::{Map, Value, json};
 
-/// The fit: the formula, its parameters, how well it does.
+/// The fit: the formula, its parameters and the quality of the fit.
 pub fn formula(calibration: &Calibration) -> String {
     let fit = &calibration.fit;
     let mut text = format!("{}\n", fit.form.card().formula);
@@ -26,7 +26,7 @@ pub fn formula(calibration: &Calibration) -> String {
     text + &format!("fitted to {rows} of {views}: {rmse}{}", heldout.unwrap_or_default())
 }
 
-/// The surface beside the published ones, and the forms compared.
+/// Table of sigma beside the published models, and the comparison of the forms.
 pub fn comparison(calibration: &Calibration) -> String {
     let mut text = surface(&calibration.model.sigma).map_or(String::new(), |s| format!("\n{s}"));
     if calibration.comparison.len() > 1 {
@@ -39,8 +39,8 @@ pub fn comparison(calibration: &Calibration) -> String {
     text
 }
 
-/// Sigma in mm on a small grid inside the valid domain, with the published ones beside it; nothing
-/// where the domain holds none of the grid.
+/// Table of sigma in mm on a small grid inside the valid domain, beside the published models; `None` where
+/// the domain contains no grid point.
 fn surface(model: &SigmaModel) -> Option<String> {
     let mut rows = String::new();
     let head = " z (m)  tilt   this sensor (95 %)       paper Eq. 1  Nguyen 2012  Khoshelham 2012   sigma in mm\n";
@@ -71,12 +71,12 @@ fn millimetres(metres: f64) -> String {
     decimals(1e3 * metres, 2)
 }
 
-/// In mm, or a dash where its authors have not measured.
+/// The sigma of a published model in mm, or a dash outside the range that its authors measured.
 fn published(model: &SigmaModel, z: f64, theta: f64) -> String {
     if model.domain.contains(z, theta) { millimetres(model.sigma(z, theta)) } else { "-".into() }
 }
 
-/// Round distances inside the domain, or its ends when none lies there.
+/// Round distances inside the domain, or its middle if it contains none.
 fn shown_distances(model: &SigmaModel) -> Vec<f64> {
     let [low, high] = model.domain.z_m;
     let round: Vec<f64> =
@@ -96,7 +96,7 @@ fn three_digits(v: f64) -> String {
     }
 }
 
-/// As many digits as the error warrants.
+/// Formats `v` with as many digits as its error warrants.
 fn three_digits_like(v: f64, error: Option<f64>) -> String {
     match error {
         Some(e) if e > 0.0 && e.is_finite() && v.abs() >= 1e-4 => {
@@ -107,7 +107,7 @@ fn three_digits_like(v: f64, error: Option<f64>) -> String {
     }
 }
 
-/// The result for programs.
+/// The result as JSON.
 pub fn as_json(calibration: &Calibration, measurements: Option<&Measurements>) -> Value {
     let fit = &calibration.fit;
     let parameters = fit.parameters.iter().map(|p| {

@@ -168,7 +168,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     conclude(done.ending, &guide, &arguments.recording, kept.len())
 }
 
-/// What is played or watched must not grow by what is taken from it.
+/// Refuses to record into the folder being played or watched: it would grow by what is taken from it.
 fn refuse_own_source(arguments: &Arguments) -> anyhow::Result<()> {
     let recording = &arguments.recording;
     let (SourceKind::Folder(from) | SourceKind::Play(from)) = &arguments.source else {
@@ -250,7 +250,7 @@ fn conclude(ending: Ending, guide: &Guide, root: &Path, kept: usize) -> anyhow::
             skipped => format!("done: {stands}, {skipped} skipped"),
         },
         Ending::Quit => format!("stopped: {on}"),
-        // Where anything will do, the end of a recording or of a folder's filling is the end.
+        // Without a list of views (--views any), the end of the recording or folder completes the capture.
         Ending::Ended(End { why, lost: false }) if wanted.any && kept > 0 => {
             format!("done: {why}; {stands}")
         }

@@ -1,4 +1,4 @@
-//! How people follow a capture: a log of lines, or a screen with keys.
+//! The user interface of a capture: a log of lines, or a screen with keys.
 
 use std::io::{IsTerminal, Write, stderr, stdin};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use kinoise::capture::{Command, Event, Guide, Interface, Line, Status, Style, re
 
 use super::console::say;
 
-/// Set by Ctrl-C, a hang-up or a polite kill.
+/// A flag set by SIGINT (Ctrl-C), SIGTERM or SIGHUP.
 pub fn stop_signal() -> std::io::Result<Arc<AtomicBool>> {
     use signal_hook::{consts, flag::register};
     let stop = Arc::new(AtomicBool::new(false));
@@ -23,12 +23,12 @@ pub fn stop_signal() -> std::io::Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// Can a person read the screen and press keys?
+/// Whether both stdin and stderr are terminals.
 pub fn is_interactive() -> bool {
     stdin().is_terminal() && stderr().is_terminal()
 }
 
-/// What happened, in one line.
+/// One line about the event; `None` if it is not worth a line.
 fn message(event: &Event) -> Option<String> {
     match event {
         Event::Begun(_) | Event::Keep | Event::Done => None,
@@ -44,7 +44,7 @@ fn message(event: &Event) -> Option<String> {
     }
 }
 
-/// One line an event.
+/// Prints one line per event.
 pub struct Log;
 
 impl Interface for Log {
@@ -64,16 +64,16 @@ impl Interface for Log {
 
 /// A silence longer than this is shown.
 const MAX_SILENCE: Duration = Duration::from_secs(2);
-/// Until there is news.
+/// Shown until the first message.
 const HINT: &str = "just switched on? leave the board standing for 20 s: the drift is measured";
 /// How long a taken view is shown.
 const FLASH: Duration = Duration::from_millis(700);
-/// Faster than this terminals fall behind, and people cannot read it.
+/// Minimum time between redraws: faster, terminals fall behind and people cannot read it.
 const REDRAW: Duration = Duration::from_millis(60);
-/// Where a terminal does not tell its size: what the oldest have, columns and rows.
+/// Columns and rows where a terminal does not report its size: the classic 80 x 24.
 const USUAL: (u16, u16) = (80, 24);
 
-/// The terminal's other screen with big letters, and keys, until dropped.
+/// The terminal's alternate screen with large letters and keys, until dropped.
 pub struct Screen {
     stop: Arc<AtomicBool>,
     status: Status,
@@ -102,14 +102,14 @@ impl Screen {
         let size = terminal::size().ok().filter(|(columns, rows)| *columns > 0 && *rows > 0);
         let (columns, rows) = size.unwrap_or(USUAL);
         let lines = render(guide, &self.status, columns.into(), rows.into());
-        // A terminal that is gone is no reason to stop taking views.
+        // Losing the terminal is no reason to stop taking views.
         let _ = draw(&lines, self.bell);
         self.bell = false;
         self.drawn_at = Some(Instant::now());
     }
 }
 
-/// Draw over what stands there.
+/// Draws the lines over the screen without clearing it first.
 fn draw(lines: &[Line], bell: bool) -> std::io::Result<()> {
     let mut out = Vec::new();
     for (row, line) in (0..).zip(lines) {
@@ -122,7 +122,7 @@ fn draw(lines: &[Line], bell: bool) -> std::io::Result<()> {
         if let Some((attribute, colour)) = style {
             queue!(out, SetAttribute(attribute), SetForegroundColor(colour))?;
         }
-        // The rest of the line in the same style: a flash fills the screen.
+        // Clear the rest of the line in the same style: a flash fills the screen.
         queue!(out, Print(&line.text), terminal::Clear(terminal::ClearType::UntilNewLine))?;
     }
     let rest = terminal::Clear(terminal::ClearType::FromCursorDown);

@@ -36,7 +36,7 @@ pub struct Global {
     pub force: bool,
 }
 
-/// More than any machine this runs on has; each costs memory before it helps.
+/// More than any machine this runs on has; each thread costs memory.
 const MAX_THREADS: usize = 1024;
 
 impl Global {
@@ -44,7 +44,7 @@ impl Global {
         Seed(self.seed.unwrap_or(1))
     }
 
-    /// For the whole process: threads, and how much is printed.
+    /// Sets the number of threads and the verbosity of the whole process.
     pub fn set_up(&self) -> anyhow::Result<()> {
         self.verbosity.set();
         if let Some(n) = self.threads {
@@ -55,7 +55,7 @@ impl Global {
         Ok(())
     }
 
-    /// The result for programs; people read stderr.
+    /// Prints the result on stdout with --json; text for people goes to stderr.
     pub fn print_json(&self, value: &serde_json::Value) -> anyhow::Result<()> {
         if self.json {
             answer(kinoise::io::pretty_json(value)?.as_bytes()).context("stdout")?;
@@ -111,7 +111,7 @@ impl Input {
         })
     }
 
-    /// The same options once more, for another command on the same folder.
+    /// The same options as arguments, for another command on the same folder.
     pub fn again(&self) -> Vec<OsString> {
         let joined = |all: &[f64]| all.iter().map(|v| shortest(*v)).collect::<Vec<_>>().join(",");
         let given = [
@@ -148,7 +148,7 @@ impl Model {
         Ok(model)
     }
 
-    /// For a page.
+    /// Description of the model for a page.
     pub fn described(&self, model: &NoiseModel) -> String {
         let Some(file) = &self.file else { return "the paper's Eq. 1, for a Kinect v1".into() };
         let sensor = model.sensor.as_ref().map_or(String::new(), |s| format!(" ({})", s.sensor));
@@ -156,7 +156,7 @@ impl Model {
         format!("{}{sensor}, made on {made}", file.display())
     }
 
-    /// For a sequence: in what the model is not its camera's is said before the work begins.
+    /// Reads the model for a sequence. Reports where it does not match the sequence's camera and range.
     pub fn read_for(&self, sequence: &Sequence) -> kinoise::Result<NoiseModel> {
         let model = self.read()?;
         if let Some(file) = &self.file {
@@ -185,16 +185,16 @@ impl Model {
         Ok(model)
     }
 
-    /// The same option once more, for another command.
+    /// The same option as arguments, for another command.
     pub fn again(&self) -> Vec<OsString> {
         model_again(self.file.as_deref())
     }
 }
 
-/// A smaller share of depths changes no weight that matters.
+/// A smaller share of depths outside the model's range changes no weight that matters.
 const MAX_OUTSIDE: f64 = 0.1;
 
-/// In what the model in `file` is not this sensor's.
+/// Reports how the model in `file` differs from this sensor.
 pub fn say_differences(file: &Path, model: &NoiseModel, sensor: &Sensor) {
     let differences = model.differences(sensor);
     if !differences.is_empty() {
@@ -221,7 +221,7 @@ pub struct Thinning {
 }
 
 impl Thinning {
-    /// The same options once more, for another command.
+    /// The same options as arguments, for another command.
     pub fn again(&self) -> Vec<OsString> {
         let stride = (self.stride > 1).then(|| ["--stride".into(), self.stride.to_string().into()]);
         let frames = self.frames.map(|n| ["--frames".into(), n.to_string().into()]);
@@ -229,15 +229,15 @@ impl Thinning {
     }
 }
 
-/// A focal length of no camera that images of 16 megapixels are read of.
+/// Longer than any focal length of a camera of up to 16 megapixels.
 const MAX_PX: f64 = 1e6;
-/// Inverse depths end at 1 cm.
+/// Largest inverse depth, that of 1 cm.
 const MAX_INVERSE_M: f64 = 100.0;
 
 /// An hour at 30 Hz.
 pub const MAX_FRAMES: usize = 108_000;
 
-/// For clap: one of several names, each with its help and what it stands for.
+/// Clap parser: one of several names, each with its help and value.
 pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
     choices: [(&'static str, &'static str, T); N],
 ) -> impl TypedValueParser<Value = T> {
@@ -251,7 +251,7 @@ pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// For clap: a whole number from `low` to `high`.
+/// Clap parser: a whole number from `low` to `high`.
 pub fn count(low: usize, high: usize) -> impl Fn(&str) -> Result<usize, String> + Clone {
     move |text| match text.parse() {
         Ok(n) if (low..=high).contains(&n) => Ok(n),
@@ -263,7 +263,7 @@ fn seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
 }
 
-/// For clap: a number from `low` to `high`.
+/// Clap parser: a number from `low` to `high`.
 pub fn between(
     low: f64,
     high: f64,
@@ -275,9 +275,9 @@ pub fn between(
     }
 }
 
-/// "a,b,..." as exactly `N` numbers from `low` to `high`, for clap.
+/// Clap parser: "a,b,..." as exactly `N` numbers from `low` to `high`.
 ///
-/// (clap's `num_args` counts arguments before it splits them at commas, so it cannot say this.)
+/// (clap's `num_args` counts arguments before it splits them at commas, so it cannot express this.)
 pub fn numbers<const N: usize>(
     low: f64,
     high: f64,
@@ -297,8 +297,8 @@ pub fn numbers<const N: usize>(
     }
 }
 
-/// When results are to say that they were made: SOURCE_DATE_EPOCH, the convention of reproducible
-/// builds, in s since 1970; `None`, for now, where that is not set.
+/// Creation time to write into results: SOURCE_DATE_EPOCH, the convention of reproducible builds, in s
+/// since 1970; `None` (the current time) where it is not set.
 pub fn source_date() -> Option<SystemTime> {
     let seconds = std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()?;
     SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(seconds))

@@ -10,7 +10,7 @@ use super::console::{beside, next_step, notes, result_lines, say};
 use super::origin::origin;
 use super::output::{COMPARISON, begin};
 
-/// Runs of each variant: their scatter is known well before.
+/// Maximum number of runs of each variant: their scatter is known well before.
 const MAX_REPEATS: usize = 100;
 
 #[derive(Debug, Args)]

@@ -1,4 +1,4 @@
-//! What people read on stderr: how much of it, the bar, and the next step.
+//! Output on stderr: verbosity, the progress bar, and the next step.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -30,7 +30,7 @@ const VERBOSE: u8 = 2;
 static LEVEL: AtomicU8 = AtomicU8::new(USUAL);
 
 impl Verbosity {
-    /// From here on, for the whole process.
+    /// Sets the level for the whole process.
     pub fn set(&self) {
         let level = USUAL + u8::from(self.verbose) - u8::from(self.quiet);
         LEVEL.store(level, Ordering::Relaxed);
@@ -44,11 +44,11 @@ fn print(min_level: u8, text: &str) {
     }
 }
 
-/// Text with what would steer a terminal, or write a line of its own, made visible: names of files and
-/// words in them are anybody's.
+/// Escapes characters that would control a terminal or begin a new line: file names and strings in files
+/// are untrusted.
 fn escaped(text: &str, kept: impl Fn(char) -> bool) -> String {
     let steers = |c: char| {
-        // Beside the control characters those that turn the direction of writing, and other line ends.
+        // Besides control characters: bidirectional formatting and other line ends.
         c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
     let shown = |c: char| match steers(c) && !kept(c) {
@@ -58,15 +58,15 @@ fn escaped(text: &str, kept: impl Fn(char) -> bool) -> String {
     text.chars().map(shown).collect()
 }
 
-/// Longer messages lose their middle: what is said first and what is to be done last stay.
+/// Longer messages lose their middle: the beginning and the remedy at the end stay.
 const MAX_MESSAGE: usize = 1200;
 
-/// Digits in a row that are shown: a double has 17, and what is longer is a slip.
+/// Maximum number of digits shown in a row: an f64 has 17, a longer number is a typing error.
 const MAX_DIGITS: usize = 40;
-/// Of a longer number.
+/// Digits shown of a longer number.
 const SHOWN_DIGITS: usize = 17;
 
-/// Numbers of hundreds of digits cut.
+/// Shortens numbers of hundreds of digits.
 fn short_numbers(text: &str) -> String {
     let mut short = String::new();
     let mut rest = text;
@@ -83,7 +83,7 @@ fn short_numbers(text: &str) -> String {
     short + rest
 }
 
-/// A message on one line.
+/// Returns the message on one line.
 pub fn one_line(text: &str) -> String {
     let text = &short_numbers(text);
     let count = text.chars().count();
@@ -97,8 +97,8 @@ pub fn one_line(text: &str) -> String {
     escaped(&format!("{head} ... ({cut} characters) ... {tail}"), |_| false)
 }
 
-/// One line. What would end it within, in somebody's name, is made visible; an empty line before or
-/// after it may be asked for.
+/// Prints one line. Line breaks within it, as in a file name, are escaped; empty lines before and after it
+/// are kept.
 fn print_line(min_level: u8, text: &str) {
     let line = text.trim_matches('\n');
     let begin = text.len() - text.trim_start_matches('\n').len();
@@ -106,22 +106,22 @@ fn print_line(min_level: u8, text: &str) {
     print(min_level, &format!("{before}{}{after}", escaped(line, |_| false)));
 }
 
-/// What the command was run for, a line; also with --quiet.
+/// Prints a line of the result, also with --quiet.
 pub fn result(line: impl AsRef<str>) {
     print_line(QUIET, line.as_ref());
 }
 
-/// The same in several lines, none of which holds a name of somebody's.
+/// Prints several lines of the result; they must not contain untrusted names.
 pub fn result_lines(text: impl AsRef<str>) {
     print(QUIET, text.as_ref());
 }
 
-/// Why the command gave up.
+/// Prints why the command failed.
 pub fn failure(text: &str) {
     result(format!("kinoise: {}", one_line(text)));
 }
 
-/// What was asked for, on stdout. A reader that closes early is no failure; a full disk is.
+/// Writes the answer to stdout. A reader that closes early is no failure; a full disk is.
 pub fn answer(text: &[u8]) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text).and_then(|()| out.flush()) {
@@ -130,17 +130,17 @@ pub fn answer(text: &[u8]) -> std::io::Result<()> {
     }
 }
 
-/// A line for people.
+/// Prints a line, unless --quiet.
 pub fn say(line: impl AsRef<str>) {
     print_line(USUAL, line.as_ref());
 }
 
-/// Lines for people, none of which holds a name of somebody's.
+/// Prints several lines, unless --quiet; they must not contain untrusted names.
 pub fn say_lines(text: impl AsRef<str>) {
     print(USUAL, text.as_ref());
 }
 
-/// With --verbose alone.
+/// Prints a line with --verbose only.
 pub fn detail(line: impl AsRef<str>) {
     print_line(VERBOSE, line.as_ref());
 }
@@ -166,11 +166,11 @@ pub fn detail_model(model: &NoiseModel, file: Option<&Path>) {
     ));
 }
 
-/// Notes of one kind that are shown; a recording of an hour may have thousands.
+/// Maximum number of notes shown of one kind; a recording of an hour may have thousands.
 const MAX_NOTES: usize = 12;
 
 pub fn notes(remarks: impl IntoIterator<Item = impl Display>) {
-    // Several readers may come upon the same.
+    // Several readers may report the same.
     let mut known = HashSet::new();
     let mut remarks =
         remarks.into_iter().map(|r| r.to_string()).filter(|r| known.insert(r.clone()));
@@ -181,8 +181,8 @@ pub fn notes(remarks: impl IntoIterator<Item = impl Display>) {
     }
 }
 
-/// Work that says what it is at: on a terminal in a bar that goes away, with --verbose in a line a
-/// stage with its time.
+/// Runs the work and shows its stages: on a terminal in a bar that disappears, with --verbose also one line
+/// per stage with its duration.
 pub fn working<T>(stage: &'static str, work: impl FnOnce(Progress<'_>) -> T) -> T {
     let shows_bar = std::io::stderr().is_terminal() && LEVEL.load(Ordering::Relaxed) > QUIET;
     let bar = if shows_bar { ProgressBar::no_length() } else { ProgressBar::hidden() };
@@ -231,7 +231,7 @@ impl Stages {
 
 impl Watch for Stages {
     fn stage(&self, name: &'static str) {
-        // What the first stage is called is said twice: by who starts the work, and by the work.
+        // The first stage is named twice: by the caller and by the work itself.
         if self.now().0 != name {
             self.end();
             *self.now() = (name, Instant::now());
@@ -244,24 +244,24 @@ impl Watch for Stages {
             self.style(COUNTED);
             self.bar.set_length(all as u64);
         }
-        // Threads report out of order; a bar never goes back.
+        // Threads report out of order; the bar must not go back.
         if done as u64 > self.bar.position() {
             self.bar.set_position(done as u64);
         }
     }
 }
 
-/// The last line of a command: what to run next, to copy.
+/// Prints the last line of a command: the next command, to copy.
 pub fn next_step(words: &[OsString]) {
     say(format!("next: kinoise {}", shell(words)));
 }
 
-/// Words as a shell reads them back.
+/// The words quoted for a shell, in one line.
 pub fn shell(words: &[OsString]) -> String {
     words.iter().map(|w| quoted(&w.to_string_lossy())).collect::<Vec<_>>().join(" ")
 }
 
-/// As a shell reads it back.
+/// The word quoted for a shell.
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -270,7 +270,7 @@ pub fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// A folder for what comes of `path`: its name with what it is, beside it.
+/// Folder beside `path`, named after it with the suffix `-what`.
 pub fn beside(path: &Path, what: &str) -> PathBuf {
     let Some(name) = path.file_name() else { return PathBuf::from(what) };
     let mut name = name.to_os_string();

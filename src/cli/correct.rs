@@ -40,7 +40,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let model = NoiseModel::read(&arguments.model)?;
     detail_model(&model, Some(&arguments.model));
-    // Here an error can name the file.
+    // Checked here, where the error can name the file.
     Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
     let recording: &Path = &arguments.recording;
     let assumed = arguments.input.assumed()?;
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         "output": arguments.output,
     }))?;
     let output = &arguments.output;
-    // A moving camera's film is mapped; without the model, whose biases are out already.
+    // A film by a moving camera is mapped, without the model: its biases are already removed.
     let is_film = ["rgb.txt", "groundtruth.txt"].iter().any(|name| output.join(name).is_file());
     let (command, suffix) = if is_film { ("map", "map") } else { ("diagnose", "diagnosis") };
     let to = beside(output, suffix);
@@ -106,7 +106,7 @@ fn report(corrected: &Corrected, arguments: &Arguments) {
     ));
 }
 
-/// Each name once, with how often it stands there.
+/// Each name once, with its number of occurrences.
 fn each_once(names: &[String]) -> String {
     let first = names.iter().enumerate().filter(|(i, name)| !names[..*i].contains(name));
     let times = |(_, name): (usize, &String)| match names.iter().filter(|n| *n == name).count() {

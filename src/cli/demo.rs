@@ -76,7 +76,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A seed that nobody chooses, ms.
+/// A seed from the clock, ms.
 fn clock() -> u64 {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     now.map_or(1, |t| t.as_millis() as u64)
@@ -100,12 +100,12 @@ fn calibrated(
     Ok((recording, measured, calibration))
 }
 
-/// Enough for noise to show whether it hangs together over time.
+/// Enough to show temporal correlation of the noise.
 const FRAMES_A_VIEW: usize = 4;
 
-/// The board in a room in which every effect of the catalogue has something to act on: a print of
-/// several greys and the infrared picture of it, a wall behind, distances by a tape, a thermometer
-/// and a light meter.
+/// Films the board in a scene where every effect of the catalogue has something to act on: a print of
+/// several greys and its infrared picture, a wall behind, distances by a tape, a thermometer and a light
+/// meter.
 fn filmed(
     sealed: &Sealed,
     sensor: &Sensor,
@@ -139,12 +139,12 @@ fn filmed(
     Ok(())
 }
 
-/// A recording within the demo's folder: one of an earlier demo goes.
+/// Begins a recording within the demo's folder, replacing that of an earlier demo.
 fn own(folder: &Path) -> kinoise::Result<OutputFolder> {
     OutputFolder::begin(folder, Leaves::Recording, &[], true)
 }
 
-/// What the calibrated model leaves out of the film, and its page.
+/// Diagnoses what the calibrated model leaves out of the film; also returns the page.
 fn diagnosed(
     film: &Path,
     model: &NoiseModel,
@@ -164,7 +164,7 @@ fn diagnosed(
 /// Frames of the film: two seconds.
 const FRAMES: usize = 60;
 
-/// An office filmed through the same sensor, mapped without a model and with it.
+/// Films an office through the same sensor and maps it without the model and with it.
 fn mapped(
     recording: &Recording,
     model: &NoiseModel,
@@ -173,7 +173,7 @@ fn mapped(
 ) -> anyhow::Result<()> {
     let seed = global.seed();
     say("\n3. Map: an office, filmed through the calibrated sensor.\n");
-    // The same seed makes the same film: one that is there already will do.
+    // The same seed makes the same film: an existing one is reused.
     let folder = output.join(format!("office-{}", seed.0));
     if !folder.join("groundtruth.txt").is_file() {
         let film = Film {
@@ -200,7 +200,7 @@ fn mapped(
     Ok(())
 }
 
-/// calib_data/ beside the caller, or in the source tree this program was built from.
+/// calib_data/ in the current folder, or in the source tree this program was built from.
 fn bundled() -> anyhow::Result<PathBuf> {
     let places =
         [Path::new("calib_data"), Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/calib_data"))];

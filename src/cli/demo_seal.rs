@@ -1,4 +1,4 @@
-//! The lot of the demo: a cause and its strength, sealed before the diagnosis, opened after it.
+//! The draw of the demo: a cause and its strength, sealed before the diagnosis, opened after it.
 
 use std::path::Path;
 
@@ -10,18 +10,19 @@ use kinoise::units::{counted, shortest, to_digits};
 use rand::Rng;
 use serde_json::{Value, json};
 
-/// One effect of the catalogue and how strong it is.
+/// One effect of the catalogue and its strength.
 pub struct Sealed {
     pub effect: Active,
     text: String,
 }
 
-/// From half to twice what is typical.
+/// Range of log2 of the strength over the typical one: from half to twice.
 const OCTAVES: std::ops::Range<f64> = -1.0..1.0;
 
 impl Sealed {
-    /// Any effect of the catalogue, each as likely. How far its strength is from none is typical, times
-    /// a factor from half to two (log-uniform); a bias takes either sign. What else it has is typical.
+    /// Draws an effect of the catalogue, each equally likely. The distance of its strength from none is the
+    /// typical one times a factor from half to two (log-uniform); a bias takes either sign. Other parameters
+    /// are typical.
     pub fn draw(seed: Seed) -> kinoise::Result<Self> {
         let mut rng = seed.stream("demo/lot");
         let card = CATALOGUE[rng.random_range(0..CATALOGUE.len())].card();
@@ -30,7 +31,7 @@ impl Sealed {
         let mirrored = card.identity - from_none;
         let either = card.statistic == "bias" && (low..=high).contains(&mirrored);
         let strength = if either && rng.random() { mirrored } else { card.identity + from_none };
-        // Three digits, so that what is read is what acts.
+        // Rounded to three digits, so that the sealed text is exactly what acts.
         let strength = format!("{:.2e}", strength.clamp(low, high)).parse().unwrap_or(typical);
         let effect = Active::typical(card.id)?.with(name, strength)?;
         let nonce: [u8; 16] = rng.random();
@@ -54,14 +55,14 @@ impl Sealed {
         )
     }
 
-    /// Write the promise into `output` before anything is filmed.
+    /// Writes the hash into `output` before anything is filmed.
     pub fn commit(&self, output: &Path) -> kinoise::Result<()> {
         let promise = output.join("sealed.sha256");
-        // As `sha256sum --check` reads it.
+        // In the format of `sha256sum --check`.
         write_atomic(&promise, format!("{}  sealed.txt\n", self.hash()).as_bytes())
     }
 
-    /// What was sealed beside what was said, for people and for programs.
+    /// Compares the sealed text with the diagnosis, as text and as JSON.
     pub fn opened(&self, diagnosis: &Diagnosis) -> (String, Value) {
         let card = self.effect.effect.card();
         let answer = Answer::of(card.id, diagnosis);
@@ -90,17 +91,17 @@ impl Sealed {
     }
 }
 
-/// How near the diagnosis came to the cause.
+/// How close the diagnosis came to the cause.
 struct Answer<'a> {
-    /// The finding that has its name.
+    /// The finding of that name.
     finding: Option<&'a Finding>,
-    /// That is the first of all.
+    /// Whether that is the first finding.
     first: bool,
-    /// It is a possible name of another finding, with its probability where that is known.
+    /// Whether it is a possible name of any finding, with its probability where known.
     among: Option<Option<f64>>,
-    /// Something was found.
+    /// Whether the verdict is a mismatch.
     mismatch: bool,
-    /// Names of other findings, but for small remains.
+    /// Names of other findings, except small remains.
     others: Vec<&'static str>,
 }
 
@@ -121,7 +122,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// For programs.
+    /// Name of the outcome in the JSON.
     fn name(&self) -> &'static str {
         match (self.finding, self.among) {
             (Some(_), _) if self.first => "first",
@@ -155,7 +156,7 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// What the diagnosis itself says of an effect that it did not name.
+/// What the diagnosis itself says about an effect that it did not name.
 fn why(id: &str, diagnosis: &Diagnosis) -> String {
     if let Some(blind) = diagnosis.cannot_tell.iter().find(|c| c.effect == id) {
         return format!("It says that it cannot tell: {}.", blind.why);
@@ -169,7 +170,7 @@ fn why(id: &str, diagnosis: &Diagnosis) -> String {
     })
 }
 
-/// One parameter, as it was and as it was found.
+/// A parameter's true and found values.
 struct Compared {
     name: &'static str,
     truth: f64,
@@ -209,7 +210,7 @@ impl Compared {
     }
 }
 
-/// Of a Gaussian, two-sided.
+/// Two-sided 95 % quantile of a Gaussian.
 const NORMAL_95: f64 = 1.96;
 
 fn digits(v: f64) -> String {
@@ -251,7 +252,7 @@ mod tests {
     fn the_lot_reaches_every_effect_and_repeats_with_its_seed() {
         let drawn: Vec<Sealed> = (0..600).map(|n| Sealed::draw(Seed(n)).expect("a draw")).collect();
         let ids: BTreeSet<&str> = drawn.iter().map(|s| s.effect.effect.card().id).collect();
-        // One of 29 is missed by 600 draws with a chance of 29 (28/29)^600 = 2e-8.
+        // The probability that 600 draws miss any of the 29: 29 (28/29)^600 = 2e-8.
         assert_eq!(ids.len(), CATALOGUE.len());
         assert!(drawn.iter().all(|s| !s.effect.is_identity()));
         let again = Sealed::draw(Seed(7)).expect("a draw");
@@ -260,7 +261,7 @@ mod tests {
         assert_eq!(hashes.len(), drawn.len());
     }
 
-    /// What is read in the seal is what acts.
+    /// The sealed text describes exactly the effect that acts.
     #[test]
     fn the_sealed_text_reads_back() {
         for seed in 0..200 {

@@ -46,7 +46,7 @@ pub struct Arguments {
     input: Input,
 }
 
-/// As of a fit of which `calibrate` writes no model.
+/// Below this, `calibrate` writes no model of a fit either.
 const MIN_R2: f64 = 0.5;
 /// Exit code when a mismatch was found.
 const FOUND: u8 = 1;
@@ -54,7 +54,7 @@ const FOUND: u8 = 1;
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     let assumed = arguments.input.assumed()?;
     let recording = open(&arguments.recording, &assumed)?;
-    // What is simulated describes itself, also beside a folder that does not.
+    // A simulated recording describes itself, even beside a folder that does not.
     let described = |path: &Path| path.join(DESCRIPTION).is_file();
     let other = |path: &PathBuf| match described(path) && !described(&arguments.recording) {
         true => open(path, &Assumed::default()),
@@ -104,16 +104,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
     Ok(if found { FOUND } else { 0 })
 }
 
-/// What a recording is held against, and how.
+/// What a recording is compared with, and how.
 pub struct HeldAgainst<'a> {
     pub simulated: Option<&'a Recording>,
     pub model: &'a NoiseModel,
     pub options: &'a DiagnoseOptions,
-    /// The options that the recording was read with, for other commands.
+    /// Input options of the recording, for other commands.
     pub input: Vec<OsString>,
 }
 
-/// Diagnose, write every output, report.
+/// Diagnoses, writes every output and reports.
 pub fn examine(
     recording: &Recording,
     held: &HeldAgainst<'_>,
@@ -133,7 +133,7 @@ pub fn examine(
     working("drawing the page", |_| -> anyhow::Result<()> {
         let pictures = with_twins(&done, &recording.sensor, model, options.seed);
         let origin = &origin(&recording.root, options.seed.0);
-        // The page names its folder, not where that stands.
+        // The page gives the folder's name, not its path.
         let folder = PathBuf::from(out.place().file_name().unwrap_or_default());
         let after = After { diagnosis, recording: &recording.root, folder: &folder, input };
         let steps: Vec<Step> = after.steps().iter().map(NextStep::on_page).collect();
@@ -164,7 +164,7 @@ fn calibrated(recording: &Recording, global: &Global) -> anyhow::Result<NoiseMod
     Ok(model)
 }
 
-/// The sigma to weigh by: the simulation's own, or the recording's where that has none.
+/// The sigma to weight by: the simulation's own, or the recording's where that cannot be calibrated.
 fn weights(
     recording: &Recording,
     simulated: &Recording,
@@ -194,13 +194,13 @@ fn summary(diagnosis: &Diagnosis) -> String {
     text.trim_end().to_string()
 }
 
-/// Effects that move the plane as a whole: a picture about the plane does not show them.
+/// Effects that move the plane as a whole: a picture of residuals about the plane does not show them.
 const OF_THE_PLANE: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
-/// More frames of a twin than this add nothing that an eye sees.
+/// More frames of a twin add nothing visible.
 const MAX_TWIN_FRAMES: usize = 16;
 
-/// Where diagnosis and simulator meet: the views worth seeing, each with its simulated twin.
-/// `given` is the model that the recording was held against.
+/// Pictures of the views worth seeing, each with its simulated twin. `given` is the model that the
+/// recording was compared with.
 fn with_twins(
     done: &Diagnosed,
     sensor: &Sensor,
@@ -217,7 +217,7 @@ fn with_twins(
     let camera = FormulaSensor { sensor, rays: &rays, sigma, effects: &effects, seed };
     let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     let retake = |index, field: &Field| {
-        // Beside a simulated recording, what is shown is a difference already.
+        // Beside a simulated recording, the fields are already differences.
         if !done.against.is_empty() {
             return None;
         }

@@ -1,4 +1,4 @@
-//! What to do with a diagnosis: commands to copy, for the terminal and for the page alike.
+//! Next steps after a diagnosis: commands to copy, for the terminal and the page.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -9,13 +9,13 @@ use kinoise::report::{Step, called};
 use super::common::model_again;
 use super::console::{beside, shell};
 
-/// A diagnosis with what its commands need to be run again.
+/// A diagnosis, with what its commands need.
 pub struct After<'a> {
     pub diagnosis: &'a Diagnosis,
     pub recording: &'a Path,
-    /// Of the results.
+    /// Folder of the results.
     pub folder: &'a Path,
-    /// The options that the recording was read with.
+    /// Input options of the recording.
     pub input: &'a [OsString],
 }
 
@@ -31,7 +31,7 @@ impl NextStep {
 }
 
 impl After<'_> {
-    /// The one to begin with first.
+    /// Next steps, in order.
     pub fn steps(&self) -> Vec<NextStep> {
         let model = ["-m".into(), self.folder.join("model.json").into()];
         let recording = || OsString::from(self.recording);
@@ -69,15 +69,15 @@ impl After<'_> {
         steps
     }
 
-    /// Is there a bias to take out, which views kept aside do not speak against?
+    /// Whether there is a bias to correct that held-out views do not contradict.
     fn corrects(&self) -> bool {
         let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
         let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.bias_gain_interval[0] > 0.0);
         gains && self.diagnosis.findings.iter().any(biased)
     }
 
-    /// The command that simulates each finding, where a formula of the catalogue does, by the model
-    /// that was `given`; and why the others have none.
+    /// Commands that simulate each finding with `--effect`, starting from the model that was `given`; and why
+    /// the other findings have none.
     pub fn reproductions(&self, given: Option<&Path>) -> Vec<String> {
         let mut commands = Vec::new();
         let mut others = Vec::new();
@@ -97,7 +97,7 @@ impl After<'_> {
         heading.into_iter().chain(commands).chain(self.without_formula(&others)).collect()
     }
 
-    /// Findings that no `--effect` stands for.
+    /// Sentence on the findings without an `--effect`.
     fn without_formula(&self, findings: &[&Finding]) -> Option<String> {
         let seen = |f: &&&Finding| f.status != Status::NotIdentifiable && f.contradicted.is_none();
         let names = |shaped: bool| {

@@ -19,7 +19,7 @@ pub struct Arguments {
     list: bool,
 }
 
-/// Columns of a page of text.
+/// Width of a page of text, columns.
 const MAX_COLUMNS: usize = 100;
 const INDENT: &str = "    ";
 
@@ -30,7 +30,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }
     let page = |card: &&Card| if arguments.list { card.id.to_string() } else { page(card) };
     let pages: Vec<String> = cards.iter().map(page).collect();
-    // The catalogue is the result, not a remark: stdout.
+    // The catalogue is the result, not a remark: it goes to stdout.
     answer(format!("{}\n", pages.join("\n")).as_bytes()).context("stdout")?;
     if let ([id], false) = (&arguments.ids[..], arguments.list) {
         let effect = Active::typical(id)?.argument();
@@ -84,7 +84,7 @@ fn describe(statistic: &str) -> &str {
     }
 }
 
-/// Append `text` in lines of at most a page's columns.
+/// Appends `text` in lines of at most a page's width.
 fn wrap(text: &str, page: &mut String) {
     let mut column = 0;
     for word in text.split_whitespace() {

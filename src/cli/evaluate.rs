@@ -55,7 +55,7 @@ enum Offset {
     Auto,
 }
 
-/// For the test of every option.
+/// For the test of all options.
 #[cfg(test)]
 pub fn offset_type() -> std::any::TypeId {
     std::any::TypeId::of::<Offset>()
@@ -69,13 +69,13 @@ fn offset(text: &str) -> Result<Offset, String> {
     seconds.map(Offset::Seconds).map_err(|why| format!("{why}, or auto"))
 }
 
-/// Three hundred years: clocks that count from 1970, and clocks that count from switching on.
+/// Three hundred years: covers the offset of a clock counting from 1970 to one counting from power-on.
 const MAX_OFFSET_S: f64 = 1e10;
-/// Of an interval: from a stamp's last digits to a day, s.
+/// Range of an interval: from a time stamp's last digits to a day, s.
 const DELTA_S: [f64; 2] = [1e-3, 86_400.0];
 
 impl Arguments {
-    /// What the estimate's clock is to be set forward by, s.
+    /// Seconds to add to the estimate's times.
     fn shift(&self, truth: &[Pose], estimate: &[Pose]) -> anyhow::Result<f64> {
         match self.offset {
             None => Ok(0.0),
@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     global.print_json(&as_json(&evaluation))
 }
 
-/// A folder stands for the file of this name in it.
+/// If `path` is a folder, the file `name` in it.
 fn file_in(path: &Path, name: &str) -> PathBuf {
     if path.is_dir() { path.join(name) } else { path.to_path_buf() }
 }
@@ -158,7 +158,7 @@ fn report(evaluation: &Evaluation, delta: Delta) {
     notes(&evaluation.remarks);
 }
 
-/// ATE and RPE, as the TUM scripts name them.
+/// ATE and RPE, named as by the TUM scripts.
 pub fn as_json(evaluation: &Evaluation) -> Value {
     let mut value = json!({
         "ate": spread(&evaluation.ate.error, "m"),

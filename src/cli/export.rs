@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }))
 }
 
-/// A file that stands there is replaced when forced, the model never.
+/// Refuses to replace an existing file unless forced, and the model in any case.
 fn refuse_taken(output: &Path, model: &Path, force: bool) -> anyhow::Result<()> {
     let Ok(standing) = output.canonicalize() else { return Ok(()) };
     if standing.is_dir() {

@@ -99,7 +99,7 @@ struct Tuning {
     no_colour: bool,
 }
 
-/// The options that a method begins with.
+/// The default options of a method.
 type Method = fn() -> Options;
 
 impl Tuning {
@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let named = [&*title, &arguments.model.described(&model)];
     let stats = follow(&sequence, &model, &options, named, out)?;
     global.print_json(&stats)?;
-    // With true poses there is something to compare with; without them, the same without the model.
+    // With true poses, compare the variants; without them, map again without the model.
     let (command, suffix, plain) = match sequence.truth.is_empty() {
         false => ("compare", "comparison", &[][..]),
         true => ("map", "unweighted", &["--weights", "none"][..]),
@@ -148,8 +148,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Map, write every output, report; what stats.json says. The page has a `title`, and calls the model
-/// as it is `named`.
+/// Maps, writes every output and reports; returns the content of stats.json. `title` is the page's title,
+/// `named` its name of the model.
 pub fn follow(
     sequence: &Sequence,
     model: &NoiseModel,
@@ -190,7 +190,7 @@ pub fn follow(
 /// Interval of the relative error.
 const DELTA: Delta = Delta::Seconds(1.0);
 
-/// Against the sequence's own true poses, where it has any.
+/// Evaluates the trajectory against the sequence's true poses, if it has any.
 fn truth(sequence: &Sequence, mapped: &Mapped) -> Option<Result<Evaluation, String>> {
     let evaluation = || evaluate(&sequence.truth, &mapped.trajectory(), DELTA);
     (!sequence.truth.is_empty()).then(|| evaluation().map_err(|e| e.to_string()))
@@ -251,7 +251,7 @@ fn name_of(path: &Path) -> String {
     whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The most memory this process had, MB; known on Linux only.
+/// Peak resident memory of this process, MB; known on Linux only.
 fn peak_rss_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
@@ -259,7 +259,7 @@ fn peak_rss_mb() -> Option<f64> {
     Some(kilobytes / 1024.0)
 }
 
-/// What this process's threads have computed so far, s; known on Linux only.
+/// CPU time of this process's threads so far, s; known on Linux only.
 fn cpu_seconds() -> Option<f64> {
     let threads = std::fs::read_dir("/proc/self/task").ok()?;
     let nanoseconds = |thread: std::io::Result<std::fs::DirEntry>| -> Option<f64> {

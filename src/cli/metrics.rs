@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     global.print_json(&value)
 }
 
-/// What a figure that is not to be had reads as.
+/// Shown for a missing figure.
 const ABSENT: &str = "-";
 
 fn report(found: &Metrics) {

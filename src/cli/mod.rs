@@ -1,4 +1,4 @@
-//! One file a subcommand: its arguments and `run`.
+//! The subcommands, one per file: arguments and `run`.
 
 mod calibrate;
 mod calibrate_summary;
@@ -88,7 +88,7 @@ enum Command {
     Man(man::Arguments),
 }
 
-/// Over the options of folders that do not describe themselves.
+/// Heading of the options for folders that do not describe themselves.
 const INPUT_HEADING: &str = "Input without a recording.json";
 
 /// Exit code of bad input or failure.
@@ -116,18 +116,18 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Asked for, or nothing was said at all: the page is the answer.
+/// Whether clap's text is a help page: asked for, or shown because no command was given.
 fn is_help(e: &clap::Error) -> bool {
     !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
 }
 
-/// What clap says, with its tips and without its usage; and where the help is.
+/// Clap's message and tips on one line, without its usage; and where to find help.
 fn one_line(e: &clap::Error) -> String {
     let text = e.to_string();
     let words = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut parts = text.split("\n\n").map(words);
     let message = parts.next().unwrap_or_default().trim_start_matches("error: ").to_string();
-    // "to pass '--x' as a value" helps nobody who mistyped an option.
+    // The tip "to pass '--x' as a value" does not help after a typing error.
     let tips = parts.filter_map(|p| p.strip_prefix("tip: ").map(|tip| format!("; {tip}")));
     let tips = tips.filter(|tip| !tip.starts_with("; to pass "));
     let help = match subcommand() {
@@ -142,10 +142,10 @@ fn command() -> clap::Command {
     <Arguments as clap::CommandFactory>::command()
 }
 
-/// The command that was meant, for the help; options may stand before it.
+/// The given command's name, to point to its help; options may precede it.
 fn subcommand() -> Option<String> {
     let command = command();
-    // What is not text is no command.
+    // An argument that is not UTF-8 is no command.
     let mut words = std::env::args_os().skip(1).filter_map(|word| word.into_string().ok());
     words.find(|word| command.find_subcommand(word).is_some())
 }
@@ -154,7 +154,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     let global = &arguments.global;
     global.set_up()?;
     output::survive_file_limits()?;
-    // A capture goes on with the views that are whole, and has its own answer.
+    // Capture handles interruption itself: it keeps the complete views.
     if !matches!(arguments.command, Command::Capture(_)) {
         output::discard_when_interrupted()?;
     }
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// An option that several commands have is spelt and described by the same letters.
+    /// An option of several commands has the same short form in all of them.
     #[test]
     fn options_are_alike_in_all_commands() {
         for (long, short) in [("output", 'o'), ("model", 'm'), ("quiet", 'q'), ("verbose", 'v')] {
@@ -222,8 +222,8 @@ mod tests {
         }
     }
 
-    /// Every option that takes numbers says which: what is no number, what is beyond any, and what fills
-    /// the screen are refused where they are read.
+    /// Every option that takes numbers has a range: non-numbers, huge values and very long input are refused
+    /// at parsing.
     #[test]
     fn every_number_has_a_range() {
         use std::any::TypeId;
@@ -246,7 +246,7 @@ mod tests {
                 let many = argument.get_value_names().map_or("", |n| n[0].as_str()).matches(',');
                 let times = if argument.get_value_delimiter().is_some() { 0 } else { many.count() };
                 for wrong in ["1e300", "-1e300", "NaN", "inf", "-inf", "1e999", &long, "", "x"] {
-                    // The seed may be any that a word of 64 bit holds.
+                    // The seed may be any u64.
                     let value = vec![wrong; times + 1].join(",");
                     let words = ["kinoise", command.get_name(), &format!("--{long_name}={value}")];
                     let refused = Arguments::try_parse_from(words).expect_err("out of range");
@@ -267,7 +267,7 @@ mod tests {
         assert!(looked_at > 80, "{looked_at} options with numbers");
     }
 
-    /// Positions, -o, -m, the command's own, input without a description, general.
+    /// Positionals, -o, -m, the command's own options, input without a description, general options.
     #[test]
     fn options_come_in_one_order() {
         let place = |a: &clap::Arg| match (a.get_long(), a.get_help_heading()) {

@@ -1,4 +1,4 @@
-//! What a page says of its making: the recording and the command as they were typed.
+//! Provenance shown on a page: the recording and the command as typed.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use kinoise::report::Origin;
 use super::common::source_date;
 use super::console::quoted;
 
-/// Results do not depend on these.
+/// Flags without influence on the results.
 const FLAGS: [&str; 5] = ["--json", "--force", "--exit-zero", "-q", "-v"];
 
-/// Of a page made from `recording` now (or at SOURCE_DATE_EPOCH).
+/// Origin of a page made from `recording` now (or at SOURCE_DATE_EPOCH).
 pub fn origin(recording: &Path, seed: u64) -> Origin {
     let typed: Vec<String> =
         std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect();
@@ -18,7 +18,7 @@ pub fn origin(recording: &Path, seed: u64) -> Origin {
     Origin::at(&quoted(&recording), &command(&typed), Some(seed), source_date())
 }
 
-/// Without what results do not depend on; of the folder of results, its name.
+/// The command line without options that do not affect results; the output folder by its name only.
 fn command(typed: &[String]) -> String {
     let (mut words, mut typed) = (vec!["kinoise".to_string()], typed.iter());
     while let Some(word) = typed.next() {

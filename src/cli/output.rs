@@ -1,4 +1,4 @@
-//! What each command leaves in its folder, and what Ctrl-C leaves of it.
+//! The files that each command leaves in its folder, and what remains of them after Ctrl-C.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,7 +11,7 @@ use kinoise::io::{Interrupted, Leaves, OutputFolder, discard_unfinished};
 use super::common::Global;
 use super::console::result;
 
-/// The files of results; the first of them no other command writes.
+/// Names of result files; no other command writes the first.
 macro_rules! results {
     ($mark:literal $(, $name:literal)*) => {
         Leaves::Results { names: &[&[$mark $(, $name)*]], marks: &[$mark] }
@@ -28,7 +28,7 @@ const CALIBRATED: &[&str] = &[
     "report.html",
 ];
 
-/// Of `calibrate` and `fit`; without a fit the measurements stand alone.
+/// Files of `calibrate` and `fit`; without a fit, the measurements alone.
 pub const CALIBRATION: Leaves =
     Leaves::Results { names: &[CALIBRATED], marks: &["measurements.csv", "sigma.svg"] };
 
@@ -53,10 +53,10 @@ pub const METRICS: Leaves = results!("metrics.json", "report.html");
 
 pub const SIGMA: Leaves = results!("sigma.txt", "sigma", "sigma.json");
 
-/// A page of the manual for the program and one a command.
+/// Manual pages: one for the program and one per command.
 pub const PAGES: Leaves = results!("kinoise.1", "kinoise-");
 
-/// A calibration with the rest of the road in folders beside it.
+/// A calibration, with the later stages of the demo in folders beside it.
 pub const DEMO: Leaves = Leaves::Results {
     names: &[
         CALIBRATED,
@@ -65,7 +65,7 @@ pub const DEMO: Leaves = Leaves::Results {
     marks: &["measurements.csv"],
 };
 
-/// The folder that a command fills; `inputs` are what it reads.
+/// Begins the folder that a command fills; `inputs` are the files it reads.
 pub fn begin(
     place: &Path,
     leaves: Leaves,
@@ -76,19 +76,19 @@ pub fn begin(
 }
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-/// Sooner than a person notices, and no load.
+/// Shorter than a person notices, and a negligible load.
 const POLL: Duration = Duration::from_millis(50);
 
-/// From here on a file that grows beyond its limit (`ulimit -f`) is an error of the write, as on a full
-/// disk, and not the end of the process.
+/// From here on, exceeding the file size limit (`ulimit -f`) is a write error, as on a full disk, and does
+/// not kill the process.
 pub fn survive_file_limits() -> std::io::Result<()> {
     #[cfg(unix)]
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
     Ok(())
 }
 
-/// From here on Ctrl-C and a polite kill throw away what is not whole, say what is kept, and end the
-/// process as they would have.
+/// From here on, SIGINT (Ctrl-C) and SIGTERM discard unfinished output, report what is kept, and end the
+/// process as they would by default.
 pub fn discard_when_interrupted() -> std::io::Result<()> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     let caught = Arc::new(AtomicUsize::new(0));
@@ -109,7 +109,8 @@ pub fn discard_when_interrupted() -> std::io::Result<()> {
     Ok(())
 }
 
-/// An error of a run whose folder was just taken away is no news: wait for the end.
+/// After an interruption, waits for the process to end: the error of a run whose folder was just removed
+/// is of no interest.
 pub fn wait_if_interrupted() {
     while INTERRUPTED.load(Ordering::SeqCst) {
         std::thread::sleep(POLL);

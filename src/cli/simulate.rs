@@ -76,7 +76,7 @@ enum PhysicsArgument {
 }
 
 impl Arguments {
-    /// The new recording.
+    /// Begins the folder of the new recording.
     fn folder(&self, global: &Global) -> kinoise::Result<OutputFolder> {
         let read = [&self.model, &self.like].into_iter().flatten();
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).collect();
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Active::refuse_twice(&effects)?;
     let physics = physics(arguments, sigma, effects)?;
     let (made, recipe) = if arguments.room.room {
-        // A model brings its own sensor; without one it is what TUM readers assume.
+        // A model brings its own sensor; the default is the camera that TUM readers assume.
         let tum = || Film::kinect(arguments.shrink.unwrap_or(1));
         let sensor = if arguments.model.is_some() { sensor } else { tum() };
         let room = Room::office(global.seed());
@@ -118,7 +118,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What to do with what was simulated.
+/// The command to run next on the simulated recording.
 fn next(arguments: &Arguments) -> Vec<OsString> {
     let output = &arguments.output;
     let (command, suffix) = match (&arguments.like, arguments.room.room) {
@@ -136,7 +136,7 @@ fn next(arguments: &Arguments) -> Vec<OsString> {
     [vec![command.into(), output.into(), "-o".into(), to.into()], model_again(model)].concat()
 }
 
-/// Film the office: what programs are told of it, and the recipe.
+/// Films the office; returns the JSON result and the recipe.
 fn write_film(film: &Film, folder: OutputFolder) -> anyhow::Result<(Value, Value)> {
     let blind = working("filming", |step| film.write(folder.path(), step))?;
     let (output, frames) = (folder.place().to_path_buf(), film.poses.len());
@@ -150,7 +150,7 @@ fn write_film(film: &Film, folder: OutputFolder) -> anyhow::Result<(Value, Value
     Ok((json!({"frames": frames, "output": output}), film.recipe()))
 }
 
-/// Shoot the views of a plane: what programs are told of them, and the recipe.
+/// Shoots the views of a plane; returns the JSON result and the recipe.
 fn shoot(
     arguments: &Arguments,
     sensor: Sensor,
@@ -186,7 +186,7 @@ fn shoot(
     Ok((made, shoot.recipe()))
 }
 
-/// The views, and the sensor of the recording that is shot again.
+/// The views, and the sensor of the recording to shoot again, if any.
 fn plans(
     arguments: &Arguments,
     global: &Global,
@@ -230,8 +230,8 @@ fn physics(
     Ok(Physics::Speckle { causes })
 }
 
-/// The model's own sensor, sigma and effects, or a Kinect and Eq. 1. Effects `given` beside a model
-/// must not be in its shapes already: they would count twice.
+/// The model's own sensor, sigma and effects, or a Kinect and Eq. 1. Refuses effects `given` beside a model
+/// that has a shape of them already: they would count twice.
 fn sensor_and_noise(
     model: Option<&Path>,
     shrink: Option<usize>,
@@ -264,17 +264,17 @@ fn sensor_and_noise(
     Ok((sensor, model.sigma, effects))
 }
 
-/// Eq. 1 everywhere a board of this size reaches, short of its pole.
+/// Eq. 1 wherever a board of this size reaches, short of its pole.
 fn eq1_everywhere() -> SigmaModel {
     let domain = Domain { z_m: [0.2, 10.0], theta_rad: [0.0, PAPER_EQ1[5] - 0.02] };
     SigmaModel::published(Form::Paper, &PAPER_EQ1, domain)
 }
 
-/// Views outside the range in which the model was fitted.
+/// Notes the number of views outside the range in which the model was fitted.
 fn note_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
     let outside = |v: &&ViewPlan| {
         let plane = &v.bench.plane;
-        // No recording has a tilt of exactly zero; facing the target is inside all the same.
+        // No recording has a tilt of exactly zero; facing the target counts as inside.
         let theta = plane.theta().max(sigma.domain.theta_rad[0]);
         !sigma.domain.contains(plane.depth(0.0, 0.0), theta)
     };
@@ -288,7 +288,7 @@ fn note_clamped(views: &[ViewPlan], sigma: &SigmaModel) {
     }
 }
 
-/// A recipe is a new file outside the recording; checked before hours of shooting, not after.
+/// Checks that the recipe is a new file outside the recording, before hours of shooting rather than after.
 fn check_recipe(path: &Path, output: &Path) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let fault = if path.exists() {

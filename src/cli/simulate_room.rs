@@ -27,7 +27,8 @@ pub struct RoomArguments {
 }
 
 impl RoomArguments {
-    /// Clap forgets what an option requires where another conflicts with that.
+    /// Refuses the room's options without --room: clap drops `requires` where the required option conflicts
+    /// with another.
     pub fn refuse_without_room(&self) -> anyhow::Result<()> {
         let given = [("--trajectory", self.trajectory.is_some()), ("--stride", self.stride != 1)];
         match given.into_iter().find(|(_, given)| !self.room && *given) {
@@ -36,7 +37,7 @@ impl RoomArguments {
         }
     }
 
-    /// The poses to film from, at most so many.
+    /// The poses to film from, at most `frames`.
     pub fn path(&self, room: &Room, frames: Option<usize>) -> anyhow::Result<Vec<Pose>> {
         let all = match &self.trajectory {
             Some(file) => fitted(file, room, frames, self.stride)?,
@@ -46,7 +47,7 @@ impl RoomArguments {
     }
 }
 
-/// The path of a file, at 30 Hz and in the room.
+/// The path of a file, resampled at 30 Hz and placed in the room.
 fn fitted(
     file: &Path,
     room: &Room,
@@ -78,7 +79,7 @@ fn fitted(
     Ok(placed.apply(&poses))
 }
 
-/// A room has no target that could be bent or move.
+/// Refuses causes of the target: a room has none that could be bent or move.
 pub fn refuse_of_target(physics: &Physics) -> anyhow::Result<()> {
     let Physics::Speckle { causes } = physics else { return Ok(()) };
     let of_target = [("bow_m", causes.bow_m), ("motion_mps", causes.motion_mps)];

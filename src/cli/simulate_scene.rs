@@ -1,4 +1,4 @@
-//! What stands before the camera of `kinoise simulate`, and where.
+//! Poses and scene options of `kinoise simulate`.
 
 use anyhow::ensure;
 use clap::Args;
@@ -32,7 +32,7 @@ pub struct PosesArguments {
     pub ordered: bool,
 }
 
-/// A view every ten seconds, day and night: a day of them.
+/// A day of one view every ten seconds.
 const MAX_VIEWS: usize = 8640;
 
 impl PosesArguments {
@@ -100,7 +100,7 @@ impl SceneryArguments {
     }
 }
 
-/// Effects that have nothing to act on in this scene.
+/// Notes effects that have nothing to act on in this scene.
 pub fn note_idle(effects: &[Active], scenery: &SceneryArguments, like: bool) {
     for active in effects {
         let (id, bare) = (active.effect.card().id, scenery.wall.is_none());

@@ -102,7 +102,7 @@ fn report_bias(bias: &SharedBias) {
     });
 }
 
-/// Who shares it, and who has its own; `how_far` off the others a unit is.
+/// Reports which units agree and which differ; `how_far` describes a unit's departure from the others.
 fn report_standings(what: &str, standings: &[Standing], how_far: &dyn Fn(usize) -> String) {
     let core = standings.iter().filter(|s| !s.is_own).map(|s| s.unit.as_str());
     match &*core.collect::<Vec<_>>().join(", ") {

@@ -1,5 +1,5 @@
-//! The paper's experiment: four variants of one mapper on one sequence, side by side, with what
-//! goes past the paper below them.
+//! The paper's experiment: four variants of one mapper on one sequence, and further variants that go beyond
+//! the paper.
 
 pub mod tables;
 
@@ -13,16 +13,16 @@ use crate::rng::Seed;
 use crate::sequence::{Moment, Sequence};
 use crate::trajectory::Pose;
 
-/// A way to map, by name.
+/// A named configuration of the mapper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variant {
     pub name: &'static str,
-    /// Is it one of the paper's four?
+    /// Whether it is one of the paper's four.
     pub of_the_paper: bool,
     pub options: Options,
 }
 
-/// The paper's four: plain, weighted, and both with the ORB start.
+/// The paper's four variants: plain, weighted, and both with the ORB start.
 pub fn of_the_paper() -> Vec<Variant> {
     let variant = |name, weights, init| Variant {
         name,
@@ -37,7 +37,7 @@ pub fn of_the_paper() -> Vec<Variant> {
     ]
 }
 
-/// One step after the other from the paper's mapper to the default.
+/// Step-by-step variants from the paper's mapper to the default.
 pub fn past_the_paper() -> Vec<Variant> {
     let paper = Options { colour: false, ..Options::paper(Weights::Both, Init::None) };
     let best = Options { colour: false, ..Options::best() };
@@ -70,21 +70,21 @@ pub struct Run {
     pub trajectory: Vec<Pose>,
 }
 
-/// All runs of a variant; the first is the one that is drawn.
+/// All runs of a variant; the first is drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     pub variant: Variant,
     pub runs: Vec<Run>,
-    /// Why a run has no figures.
+    /// Why a run failed.
     pub failed: Option<String>,
 }
 
-/// Everything that the tables and figures show.
+/// All data shown by the tables and figures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     pub sequence: String,
     pub rows: Vec<Row>,
-    /// A camera that never moves: what an estimate must beat.
+    /// A camera that never moves, as the baseline.
     pub still: Evaluation,
     pub truth: Vec<Pose>,
     pub remarks: Vec<String>,
@@ -93,8 +93,8 @@ pub struct Comparison {
 /// Called before each run: the variant's name, runs done, runs in all.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 
-/// Run all variants, each `repeats` times with another seed.
-/// An error when the sequence has no ground truth of its time, or the model is of another sensor.
+/// Runs all variants, each `repeats` times with different seeds.
+/// Fails if the sequence has no ground truth for its time, or the model is of another sensor.
 pub fn compare(
     sequence: &Sequence,
     model: &NoiseModel,
@@ -128,7 +128,7 @@ pub fn compare(
                 Ok(run) => row.runs.push(run),
                 Err(e) => row.failed = Some(e.to_string()),
             }
-            // Without a draw of chance every repeat is the same.
+            // Without randomness every repeat is the same.
             if variant.options.init != Init::Orb {
                 break;
             }

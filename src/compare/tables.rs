@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::{Comparison, Row, Run};
 use crate::evaluate::{Evaluation, Spread};
 
-/// What a table shows of an evaluation.
+/// The error statistics that a table shows.
 type Column = fn(&Evaluation) -> Spread;
 
 const TABLES: [(&str, Column); 3] = [
@@ -18,11 +18,11 @@ const TABLES: [(&str, Column); 3] = [
     }),
 ];
 
-/// One of the four: a row for each variant.
+/// One of the four tables, with a row for each variant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     pub title: &'static str,
-    /// Titles, and decimals.
+    /// Column titles and decimals.
     pub columns: Vec<(&'static str, usize)>,
     pub rows: Vec<TableRow>,
 }
@@ -30,13 +30,14 @@ pub struct Table {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableRow {
     pub name: &'static str,
-    /// None where the variant has no run.
+    /// Empty if the variant has no run.
     pub figures: Vec<f64>,
-    /// Empty where there is nothing to add.
+    /// Empty if there is nothing to add.
     pub remark: String,
 }
 
-/// All four; with repeats, means over the runs, and the rmse's standard deviation.
+/// All four tables. With repeats, Tables III to V show means over the runs and the standard deviation of the
+/// rmse; Table VI shows the first run.
 pub fn tables(comparison: &Comparison) -> Vec<Table> {
     let mut tables: Vec<Table> = TABLES
         .iter()
@@ -64,9 +65,9 @@ pub fn tables(comparison: &Comparison) -> Vec<Table> {
     tables
 }
 
-/// All four, as text.
+/// All four tables as text.
 pub fn text(comparison: &Comparison) -> String {
-    // A name is anybody's: it must not make lines of its own.
+    // A sequence name may be anything, but must not add lines.
     let mut text = format!("{}\n", comparison.sequence.replace(char::is_control, "?"));
     for table in tables(comparison) {
         let header: String = table.columns.iter().map(|(c, _)| format!("{c:>11}")).collect();
@@ -105,7 +106,7 @@ fn failure(row: &Row) -> String {
     format!("  no figures: {}", why.replace(char::is_control, "?"))
 }
 
-/// Everything with full digits, SI.
+/// All results at full precision, in SI units.
 pub fn json(comparison: &Comparison) -> Value {
     let run = |r: &Run| {
         let mut object = Map::new();

@@ -1,4 +1,4 @@
-//! What a model says about a sensor's biases, ready to be taken out of its depth.
+//! A model's sensor biases, prepared for removal from depth images.
 
 use super::locking::Locking;
 use super::slopes::Noise;
@@ -11,10 +11,10 @@ use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::{Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
 
-/// What is known of a frame beside its depths.
+/// Conditions of a frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Conditions {
-    /// Since the session began, s.
+    /// Time since the session began, s.
     pub session_s: f64,
     /// Degrees Celsius.
     pub temperature_c: Option<f64>,
@@ -23,40 +23,40 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// A curve over the temperature needs a thermometer.
+    /// Whether `term` can be evaluated: a curve over temperature needs a measured temperature.
     pub(super) fn determine(&self, term: &Term) -> bool {
         self.temperature_c.is_some() || !term.needs().temperature
     }
 }
 
-/// A term of the model with the disparities at which it was learnt, px.
+/// A term of the model with the range of disparities at which it was learnt, px.
 pub(crate) type LearntTerm = (Term, [f64; 2]);
 
-/// The biases of a sensor, ready to be taken out of its depth images.
+/// The biases of a sensor, prepared for removal from its depth images.
 #[derive(Debug, Clone)]
 pub struct Correction {
     pub(crate) camera: Camera,
     pub(super) rays: Rays,
-    /// Disparity in px times depth in m, as the model counts it.
+    /// Disparity in px times depth in m, as in the model.
     pub(crate) scale_px_m: f64,
-    /// Stored depth over true depth, the same everywhere.
+    /// Stored over true depth, the same for all pixels.
     pub(crate) scale: f64,
     pub(crate) drifts: Vec<Drift>,
-    /// Share of the ray's excess over the depth that is stored.
+    /// Share of the ray's excess length over the depth that is included in stored depths.
     pub(crate) ray_share: f64,
-    /// Stored depth over true depth of each pixel; empty where it is one.
+    /// Stored over true depth of each pixel; empty if it is one.
     along_ray: Vec<f32>,
-    /// What depends on the pixel alone.
+    /// Terms that depend only on the pixel.
     pub(crate) still_terms: Vec<Term>,
-    /// Their sum at each pixel, px; empty where there are none.
+    /// Sum of these terms at each pixel, px; empty if there are none.
     still: Vec<f32>,
     pub(crate) locking: Option<Locking>,
-    /// Do whole columns step, differently in every image?
+    /// Whether whole columns have offsets that differ from image to image.
     pub(crate) column_steps: bool,
-    /// What depends on more than the pixel.
+    /// Terms that depend on more than the pixel.
     pub(crate) terms: Vec<LearntTerm>,
     pub(crate) needs: Needs,
-    /// What changes the logarithm of the noise's variance.
+    /// Terms that change the logarithm of the noise variance.
     pub(crate) variance: Vec<LearntTerm>,
     pub(super) sigma: SigmaModel,
     pub(crate) noise: Noise,
@@ -66,7 +66,7 @@ pub struct Correction {
     remarks: Vec<String>,
 }
 
-/// Of shapes that do not say where they were learnt.
+/// Range of a term that does not state where it was learnt.
 const ANYWHERE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Warm-up: depth drifts by `relative` with a time constant.
@@ -77,13 +77,13 @@ pub(crate) struct Drift {
 }
 
 impl Correction {
-    /// What `model` says about `sensor`.
-    /// An error when the model is of a sensor of another resolution, or holds what the catalogue has not.
+    /// Prepares the biases of `model` for `sensor`.
+    /// Fails if the model is of another resolution or contains effects that the catalogue does not have.
     pub fn of(model: &NoiseModel, sensor: &Sensor) -> Result<Self> {
         let of_model = model.described_sensor()?;
         model.refuse_other_size(sensor)?;
         let camera = sensor.camera.clone();
-        // Terms are in px of the disparity that the model counts.
+        // Terms are in px of the model's disparity.
         let scale_px_m = of_model
             .as_ref()
             .and_then(Sensor::disparity_px_m)
@@ -118,7 +118,7 @@ impl Correction {
         Ok(correction)
     }
 
-    /// Is there nothing to take out?
+    /// Whether there is nothing to remove.
     pub fn is_identity(&self) -> bool {
         self.scale == 1.0
             && self.drifts.is_empty()
@@ -129,17 +129,17 @@ impl Correction {
             && self.terms.is_empty()
     }
 
-    /// Ids of the model's entries, or parts of them, that are no bias of the sensor.
+    /// Ids of the model's entries that are not, or not entirely, biases of the sensor.
     pub fn ignored(&self) -> &[String] {
         &self.ignored
     }
 
-    /// Ids of the entries, or parts of them, that neither the bias nor the noise of a pixel shows.
+    /// Ids of the entries with a part that is no predictable bias or noise of a pixel.
     pub fn unpredicted(&self) -> &[String] {
         &self.unpredicted
     }
 
-    /// Disparities at which all that grows with the disparity was learnt, px.
+    /// Range of disparities at which all terms that scale with the disparity were learnt, px.
     pub(super) fn learnt_px(&self) -> Option<[f64; 2]> {
         let grows = |(t, _): &&LearntTerm| t.basis.still_power().is_some();
         let ranges = self.terms.iter().filter(grows).map(|(_, learnt)| *learnt);
@@ -147,19 +147,19 @@ impl Correction {
         (both != ANYWHERE).then_some(both)
     }
 
-    /// What is odd about model and sensor together, in sentences.
+    /// Remarks on this combination of model and sensor.
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
 
-    /// Stored depth over true depth, the same everywhere in a frame.
+    /// Stored over true depth, the same for all pixels of a frame.
     pub(super) fn factor(&self, conditions: &Conditions) -> f64 {
         let drift =
             |d: &Drift| 1.0 - d.relative * (-conditions.session_s / d.time_constant_s).exp_m1();
         self.scale * self.drifts.iter().map(drift).product::<f64>()
     }
 
-    /// Disparity without the driver's errors and those of the pixel and of its phase, px.
+    /// Disparity without the driver's errors, the pixel's own bias and pixel locking, px.
     pub(super) fn disparity(&self, i: usize, z: f32, factor: f64) -> f64 {
         let along = self.along_ray.get(i).copied().map_or(1.0, f64::from);
         let still = self.still.get(i).copied().map_or(0.0, f64::from);
@@ -186,7 +186,7 @@ impl Correction {
         Ok(())
     }
 
-    /// An entry that the catalogue's formula stands for.
+    /// Adds an entry given by the catalogue's formula.
     fn add_formula(&mut self, entry: &model::Effect) -> Result<()> {
         let active = Active::from_model(entry)?;
         if active.is_identity() {
@@ -221,7 +221,7 @@ impl Correction {
         Ok(())
     }
 
-    /// 1 + share (ray length over depth - 1), of each pixel.
+    /// 1 + share (ray length over depth - 1) of each pixel.
     fn ray_over_depth(&self, share: f64) -> Vec<f32> {
         let factor = |i: usize| {
             let (x, y) = self.rays.at(i);
@@ -230,7 +230,7 @@ impl Correction {
         (0..self.camera.pixels()).map(factor).collect()
     }
 
-    /// Terms that depend on the pixel alone are added up once for all images.
+    /// Sums the terms that depend only on the pixel once for all images.
     fn settle(&mut self) {
         let (still, other): (Vec<_>, Vec<_>) =
             self.terms.drain(..).partition(|(t, _)| t.needs() == Needs::default());
@@ -249,7 +249,7 @@ impl Correction {
     }
 }
 
-/// A change of the noise that follows from the picture, and from nothing of a board or its light.
+/// Whether a term changes the noise predictably from the image alone, without the board or its light.
 fn is_predictable_variance(term: &Term) -> bool {
     let needs = term.needs();
     let own = term.belongs_to_sensor() && !needs.board && !needs.light;

@@ -1,4 +1,4 @@
-//! Saying what the raw values of a folder mean once they are in another code.
+//! Describes the raw values of a folder that were written in another code.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -11,8 +11,8 @@ use crate::io::{DESCRIPTION, Layout, pretty_json, write_atomic, write_recording_
 use crate::read::read_json;
 use crate::view::Sensor;
 
-/// Say in recording.json of `folder` what the raw values mean now; what else it says stays. `images`
-/// are the stamps and names that a dump's index or a container listed.
+/// Writes the new code into recording.json of `folder` and keeps its other entries. `images` are the stamps
+/// and names that a dump's index or a container listed.
 pub(super) fn describe(
     folder: &Path,
     layout: Layout,
@@ -23,8 +23,8 @@ pub(super) fn describe(
         Layout::Dump | Layout::Container => {
             let mut list = String::from("# timestamp path\n");
             for (stamp, file) in images {
-                // A dump's names have six digits; a container's stamps are kept as they are. Writing to
-                // a String does not fail.
+                // Stamps in a dump's file names have six decimals; a container's are kept as they are.
+                // Writing to a String does not fail.
                 let _ = match layout {
                     Layout::Dump => writeln!(list, "{stamp:.6} {}", file.display()),
                     _ => writeln!(list, "{stamp} {}", file.display()),
@@ -43,7 +43,7 @@ pub(super) fn describe(
     }
 }
 
-/// The text of recording.json with another code.
+/// The text of recording.json with the code replaced.
 fn with_code(text: &str, code: &DepthCode) -> Result<String> {
     let failed = |e: serde_json::Error| Error::Argument {
         what: format!("{DESCRIPTION}: {e}"),

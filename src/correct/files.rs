@@ -1,4 +1,4 @@
-//! The files of a recording beside its depth images.
+//! The files of a recording other than its depth images.
 
 use std::collections::HashSet;
 use std::io::{self, Read};
@@ -8,14 +8,14 @@ use crate::error::{Error, Result};
 use crate::io::{is_description, write_atomic_with};
 use crate::read::{MAX_IMAGE, MAX_TEXT, open};
 
-/// Folders in folders: more is a link that leads back to where it stands.
+/// Deepest nesting of folders; deeper nesting means a link that leads back into the recording.
 const MAX_DEPTH: usize = 12;
 
-/// The longest file that is copied of what no command reads, bytes: ten minutes of a compressed video of
-/// the session. A sparse file of a terabyte would fill the disk.
+/// Largest file copied that no command reads, bytes: ten minutes of compressed video of the session. Without
+/// a limit, a sparse file of a terabyte would fill the disk.
 const MAX_OTHER: u64 = 1 << 30;
 
-/// The longest file of its kind that is copied: what would be refused as an input is no part of the
+/// Largest file of its kind that is copied. A file that would be refused as an input is no part of the
 /// recording.
 fn max_bytes(file: &Path) -> u64 {
     let kind = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
@@ -26,9 +26,9 @@ fn max_bytes(file: &Path) -> u64 {
     }
 }
 
-/// Every file below `root`, as paths relative to it, in name order. A link may lead out of `root` to
-/// what is `read` as part of the recording, so that folders of links to some of its views will do.
-/// An error when one is no regular file, or stands outside and is not `read`: it may be private.
+/// Every file below `root`, as relative paths in name order. A link may lead out of `root` only to files that
+/// are `read` as part of the recording, so that a folder of links to some of its views works.
+/// Fails at an entry that is no regular file, or that lies outside and is not `read`: it may be private.
 pub(super) fn files_below(root: &Path, read: &HashSet<&Path>) -> Result<Vec<PathBuf>> {
     let real_root = root.canonicalize().map_err(|e| Error::read(root, e))?;
     let mut files = Vec::new();
@@ -62,7 +62,7 @@ pub(super) fn files_below(root: &Path, read: &HashSet<&Path>) -> Result<Vec<Path
     Ok(files)
 }
 
-/// An error of a file that a link names outside of `root`, which has no links in it.
+/// Fails if a link leads out of `root`, which must be canonical.
 fn refuse_outside(file: &Path, root: &Path) -> Result<()> {
     let target = file.canonicalize().map_err(|e| Error::read(file, e))?;
     if target.starts_with(root) {
@@ -72,12 +72,12 @@ fn refuse_outside(file: &Path, root: &Path) -> Result<()> {
     Err(Error::recording(file, what, "copy into the recording what it names, or take it out"))
 }
 
-/// Is it a file without which a folder is no recording, and which therefore comes last?
+/// Whether a folder is no recording without this file, which is therefore written last.
 pub(super) fn makes_a_recording(file: &Path) -> bool {
     is_description(file.file_name().and_then(|n| n.to_str()).unwrap_or_default())
 }
 
-/// Copy files, those that make a recording of the folder after all others.
+/// Copies files in the given order.
 pub(super) fn copy(from: &Path, to: &Path, files: &[&PathBuf]) -> Result<()> {
     for file in files {
         let (source, target) = (from.join(file), to.join(file));
@@ -85,7 +85,7 @@ pub(super) fn copy(from: &Path, to: &Path, files: &[&PathBuf]) -> Result<()> {
         let mut reader = open(&source)?;
         let length = reader.metadata().map_err(|e| Error::read(&source, e))?.len();
         let max = max_bytes(file);
-        // Piece by piece: it may be longer than memory. It may grow meanwhile.
+        // Streamed, because the file may be larger than memory. It may also grow meanwhile.
         let mut within = reader.by_ref().take(max + 1);
         let copied = if length > max {
             length
@@ -114,8 +114,8 @@ pub(super) fn make_folder_of(file: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))
 }
 
-/// Where a listed image stands, relative to `root`.
-/// An error when it stands outside: written again it would be lost.
+/// Path of a listed image relative to `root`.
+/// Fails if the image lies outside, because the copied list would no longer find it.
 pub(super) fn inside(root: &Path, file: &Path) -> Result<PathBuf> {
     let mut parts: Vec<Component<'_>> = Vec::new();
     let relative = file.strip_prefix(root).ok();

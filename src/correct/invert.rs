@@ -1,4 +1,4 @@
-//! One depth image: the disparity that the sensor's errors turn into the measured one.
+//! Corrects one depth image: finds the disparity that the sensor's errors turn into the measured one.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -11,16 +11,16 @@ use crate::measure::ColumnSteps;
 use crate::plane::Plane;
 use crate::terms::{PixelContext, Pixels};
 
-/// The error of a term is taken at the corrected disparity: substituted until it changes by less, px.
-/// What is left is less again by the term's steepness, a hundredth for terms of a few tenths of a px
-/// over tens of px: two rounds, and a hundred thousandth of a pixel.
+/// Change of the disparity at which the fixed-point iteration stops, px. Terms are evaluated at the corrected
+/// disparity. The remaining error is smaller by the slope of the terms, 0.01 for a few tenths of a px over
+/// tens of px: two rounds leave 1e-5 px.
 const CONVERGED_PX: f64 = 1e-3;
 const MAX_ROUNDS: usize = 8;
 
 impl Correction {
-    /// Take the biases out of one depth image, m; NaN where there is no measurement stays NaN. A
-    /// depth becomes infinite where the errors leave no disparity.
-    /// An error when the image is not of the sensor's size.
+    /// Removes the biases from one depth image, m. NaN, where there is no measurement, stays NaN; a depth
+    /// becomes infinite where the errors leave no disparity.
+    /// Fails if the image does not have the sensor's size.
     pub fn apply(&self, depth_m: &mut [f32], conditions: &Conditions) -> Result<()> {
         let corrected = self.corrected(depth_m, conditions)?;
         depth_m.iter_mut().zip(corrected).for_each(|(z, corrected)| *z = corrected as f32);
@@ -28,7 +28,7 @@ impl Correction {
     }
 
     /// As [`Correction::apply`], in double precision.
-    /// An error when the image is not of the sensor's size.
+    /// Fails if the image does not have the sensor's size.
     pub fn corrected(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f64>> {
         self.refuse_size(depth_m)?;
         if self.is_identity() {
@@ -92,13 +92,13 @@ impl Correction {
         d
     }
 
-    /// Does the model say how sure its biases are?
+    /// Whether the model states the uncertainty of its biases.
     pub fn knows_uncertainty(&self) -> bool {
         !self.uncertainty.is_empty()
     }
 
-    /// Standard uncertainty of the corrected depths `depth_m`, m, as far as the learnt shapes go:
-    /// NaN where there is no depth. What planes cannot see is no part of it.
+    /// Standard uncertainty of the corrected depths `depth_m` from the learnt shapes, m; NaN where there is
+    /// no depth. Errors that planes cannot show are not included.
     pub fn uncertainty_m(&self, depth_m: &[f32], conditions: &Conditions) -> Vec<f32> {
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
         let slopes = self.uncertainty.needs.slope.then(|| self.slopes(depth_m, 1.0));
@@ -118,10 +118,9 @@ impl Correction {
         depth_m.par_iter().enumerate().map_init(Vec::new, sigma).collect()
     }
 
-    /// Standard deviation of each stored depth, m, as the model predicts it: sigma at the corrected
-    /// depth and the surface's tilt, times what the model's terms of the variance say there; NaN where
-    /// there is no depth.
-    /// An error when the image is not of the sensor's size.
+    /// Predicted standard deviation of each stored depth, m: sigma at the corrected depth and the surface's
+    /// tilt, scaled by the model's variance terms; NaN where there is no depth.
+    /// Fails if the image does not have the sensor's size.
     pub fn sigma_m(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f64>> {
         self.refuse_size(depth_m)?;
         let mut known = self.known(depth_m, conditions);
@@ -144,7 +143,8 @@ impl Correction {
         Ok(depth_m.par_iter().enumerate().map(sigma).collect())
     }
 
-    /// What whole columns err by in this image, px, where the model says that they do and the image shows how.
+    /// Offset of each column in this image, px; empty unless the model has such offsets and the image shows
+    /// them.
     fn columns(&self, depth_m: &[f32], factor: f64) -> Vec<f64> {
         if !self.column_steps {
             return Vec::new();
@@ -168,24 +168,24 @@ impl Correction {
     }
 }
 
-/// A term's value; what stands still in the picture and grows with the disparity is held where its
-/// learning ended.
+/// Value of a term. A shape that is fixed in the image and scales with disparity is held at the ends of its
+/// learnt range.
 fn held((term, [low, high]): &LearntTerm, place: &PixelContext) -> f64 {
     term.value(&where_held(&term.basis, [*low, *high], place))
 }
 
-/// What is known of the places of one image.
+/// Quantities shared by all pixels of one image.
 struct Known<'a> {
     conditions: &'a Conditions,
-    /// Stored depth over true depth, the same everywhere.
+    /// Stored over true depth, the same for all pixels.
     factor: f64,
     slopes: Option<Slopes>,
     pixels: Pixels<'a>,
-    /// Those that can be evaluated.
+    /// Terms that can be evaluated.
     terms: Vec<&'a LearntTerm>,
-    /// What whole columns err by in this image, px; empty where they do not.
+    /// Offset of each column in this image, px; empty if there are none.
     columns: Vec<f64>,
-    /// Does any of them ask for the tilt?
+    /// Whether any term needs the tilt.
     tilt: bool,
 }
 
@@ -198,7 +198,7 @@ impl Known<'_> {
         place
     }
 
-    /// Put a surface of this disparity, px, before the pixel, leaning as the picture shows.
+    /// Places a surface of this disparity, px, at the pixel, tilted as the image shows.
     fn stand(&self, place: &mut PixelContext, i: usize, disparity: f64) {
         let Pixels { camera, scale_px_m, .. } = self.pixels;
         place.at_disparity(disparity, scale_px_m);

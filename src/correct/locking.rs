@@ -1,18 +1,18 @@
-//! Undoing pixel locking, d - a sin(2 pi d).
+//! Inverts pixel locking, d - a sin(2 pi d).
 
 use std::f64::consts::TAU;
 
-/// What to add to a locked disparity, by its phase.
+/// Shifts to add to a locked disparity, tabulated over its phase.
 #[derive(Debug, Clone)]
 pub(crate) struct Locking {
     amplitude_px: f64,
     shifts: Vec<f64>,
 }
 
-/// Linear between nodes a thousandth of a pixel apart: for a tenth of a pixel of amplitude, where
-/// the inverse bends by a few px per px^2, it errs by 1e-6 px.
+/// Nodes for linear interpolation, a thousandth of a pixel apart. For an amplitude of a tenth of a pixel the
+/// inverse has a curvature of a few px per px^2, and the error is 1e-6 px.
 const NODES: usize = 1024;
-/// Halvings: the bracket of twice the amplitude ends below a millionth of it.
+/// Bisection steps: they shrink the bracket of twice the amplitude to below a millionth of it.
 const HALVINGS: usize = 24;
 
 impl Locking {
@@ -25,12 +25,12 @@ impl Locking {
         self.amplitude_px
     }
 
-    /// What to add at phases evenly spaced from 0 to 1, px.
+    /// Shifts at phases evenly spaced from 0 to 1, px.
     pub fn shifts(&self) -> &[f64] {
         &self.shifts
     }
 
-    /// The disparity before it was locked, px.
+    /// The disparity before locking, px.
     pub fn unlock(&self, locked: f64) -> f64 {
         let place = locked.rem_euclid(1.0) * NODES as f64;
         let k = (place as usize).min(NODES - 1);
@@ -39,8 +39,8 @@ impl Locking {
     }
 }
 
-/// From a locked disparity to one that is locked there. Beyond 1/(2 pi) px of amplitude there are
-/// several; halving finds one of them.
+/// Shift from a locked disparity to one that locks to it. Above an amplitude of 1/(2 pi) px there are
+/// several; bisection finds one of them.
 fn shift(locked: f64, amplitude: f64) -> f64 {
     let (mut low, mut high) = (locked - amplitude, locked + amplitude);
     for _ in 0..HALVINGS {

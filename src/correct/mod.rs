@@ -1,10 +1,10 @@
-//! Taking a model's biases out of depth again: the effects of the light's path, backwards.
+//! Removes a model's biases from depth images by inverting the effects of the light's path.
 //!
 //! ```text
 //! raw -> z -driver-> disparity -still, locking, terms-> disparity -> z -> raw
 //! ```
-//! A [`Correction`] does one depth image, and says how sure each corrected depth is where the model
-//! holds the covariance of its biases; [`correct_recording`] does all that lie in a folder.
+//! A [`Correction`] corrects one depth image. If the model holds the covariance of its biases, it also gives
+//! the uncertainty of each corrected depth. [`correct_recording`] corrects all images of a folder.
 
 mod correction;
 mod describe;

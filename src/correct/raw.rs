@@ -1,12 +1,12 @@
-//! From corrected depths to raw values that are never "no measurement".
+//! Converts corrected depths to raw values that never mean "no measurement".
 
 use crate::frame::{DepthCode, FARTHEST_M};
 
-/// A depth code with its ends.
+/// A depth code with its range.
 #[derive(Debug, Clone)]
 pub(super) struct RawCode {
     pub code: DepthCode,
-    /// Raw values of the smallest and of the greatest depth.
+    /// Raw values of the smallest and the largest depth.
     near: u16,
     far: u16,
 }
@@ -20,7 +20,7 @@ impl RawCode {
         RawCode { code, near: near.unwrap_or(0), far: far.unwrap_or(0) }
     }
 
-    /// The raw value nearest to a positive depth (m), and whether the code ended before it.
+    /// Raw value nearest to a positive depth (m), and whether the depth was clamped to the code's range.
     pub fn nearest(&self, z: f32) -> (u16, bool) {
         let metres = |word| self.code.metres(word).unwrap_or(f64::NAN);
         for (end, beyond) in
@@ -35,18 +35,18 @@ impl RawCode {
         if self.code.metres(word).is_some() {
             return (word, false);
         }
-        // The number next to it that does not mean "no measurement": found by a step of the code.
+        // The neighbouring value that does not mean "no measurement": one step of the code nearer.
         let step = self.code.step_inverse(z) * z * z;
         (self.code.raw((z - step).max(metres(self.near))), false)
     }
 }
 
-/// Raw values a metre to choose from, the finest first.
+/// Candidate raw values per metre, the finest first.
 const UNITS: [f64; 6] = [10_000.0, 5000.0, 2000.0, 1000.0, 500.0, TOP / FARTHEST_M];
-/// The greatest raw value that a depth can have.
+/// Largest raw value of a depth.
 const TOP: f64 = 65534.0;
 
-/// The finest code in metres that reaches `max_m`.
+/// The finest metric code that reaches `max_m`.
 pub(super) fn metric(max_m: f64) -> DepthCode {
     let fits = |units: &&f64| max_m * **units <= TOP;
     let units_per_metre = *UNITS.iter().find(fits).unwrap_or(&UNITS[UNITS.len() - 1]);

@@ -1,4 +1,4 @@
-//! A whole folder written again with the biases taken out of its depth images.
+//! Rewrites a whole folder with the biases removed from its depth images.
 
 use std::path::Path;
 
@@ -14,21 +14,21 @@ use crate::io::{
 };
 use crate::model::NoiseModel;
 
-/// How a recording is corrected.
+/// Options for correcting a recording.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CorrectOptions<'a> {
-    /// Leave raw disparities in their code.
+    /// Keeps raw disparities in their code.
     pub keep_code: bool,
-    /// A folder for images of the correction's standard uncertainty.
+    /// Folder for images of the correction's standard uncertainty.
     pub sigma: Option<&'a Path>,
 }
 
-/// Write the recording at `root` again into `output`, all its files, `model`'s biases taken out of
-/// the depth. Where nothing described the sensor, recording.json does in `output`. Raw disparities become metric values, finer than the read-out's steps, unless
-/// `keep_code`. Images of the uncertainty have the depth images' names, 16 bit, in units of 10 um
-/// ([`SIGMA_UNITS_PER_METRE`]); 0 where there is no depth.
-/// An error when `root` is no recording, the model is of another resolution, or `output` has something in
-/// it, lies inside `root`, or cannot be written.
+/// Copies the recording at `root` to `output` with the biases of `model` removed from its depth images.
+/// If nothing described the sensor, recording.json in `output` does. Raw disparities become metric values,
+/// finer than the read-out steps, unless `keep_code` is set. Images of the uncertainty have the depth images'
+/// names, 16 bits in units of 10 um ([`SIGMA_UNITS_PER_METRE`]), 0 where there is no depth.
+/// Fails if `root` is no recording, the model is of another resolution, or `output` is not empty, lies inside
+/// `root`, or cannot be written.
 pub fn correct_recording(
     root: &Path,
     assumed: &Assumed,

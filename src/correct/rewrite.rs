@@ -1,4 +1,4 @@
-//! The files of a recording on their way into another folder, the depth images corrected.
+//! Copies the files of a recording into another folder, with corrected depth images.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -20,37 +20,37 @@ use crate::io::{
 use crate::read::read_image;
 use crate::view::{FrameRef, Recording, Sensor};
 
-/// What was done to a recording.
+/// Result of correcting a recording.
 #[derive(Debug, Clone)]
 pub struct Corrected {
     pub frames: usize,
     /// Pixels with a measurement, in all frames.
     pub measured: usize,
-    /// Those whose stored depth is another now.
+    /// Pixels whose stored depth changed.
     pub changed: usize,
-    /// Those whose corrected depth lies beyond the ends of the depth code.
+    /// Pixels whose corrected depth lies beyond the ends of the depth code.
     pub clamped: usize,
-    /// Pixels at disparities beyond those that the model was learnt at: held at the edge.
+    /// Pixels at disparities outside the model's learnt range, where the correction is held at the edge.
     pub beyond: usize,
-    /// Root mean square over all measured pixels of what was taken out, m.
+    /// RMS of the correction over all measured pixels, m.
     pub rms_shift_m: f64,
-    /// How the corrected raw values become metres.
+    /// Depth code of the corrected raw values.
     pub code: DepthCode,
-    /// Entries of the model that were not taken out.
+    /// Entries of the model that were not corrected.
     pub ignored: Vec<String>,
-    /// What was odd, in sentences.
+    /// Remarks on anything unusual.
     pub remarks: Vec<String>,
 }
 
-/// A depth image to be written again.
+/// A depth image to be rewritten.
 pub(super) struct Image {
-    /// Relative to the corrected recording; where the source is a file of its own, as it stood there.
+    /// Path relative to the corrected recording; that of the source if it is a file of its own.
     pub file: PathBuf,
     pub source: FrameRef,
     conditions: Conditions,
 }
 
-/// The depth images with what is known of each; each once, though several lists may name it.
+/// The depth images with their conditions, each once even if several lists name it.
 pub(super) fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
     let frames = || recording.views.iter().flat_map(|v| v.depth.iter().map(move |f| (v, f)));
     let begin = frames().map(|(_, f)| f.timestamp).fold(f64::INFINITY, f64::min);
@@ -73,7 +73,7 @@ pub(super) fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
     Ok(images)
 }
 
-/// Written again, lists of infrared and colour images would name what is not there.
+/// Fails if an infrared or colour image lies outside `root`: the copied lists would name a missing file.
 fn refuse_others_outside(recording: &Recording, root: &Path) -> Result<()> {
     let colour = root.join("rgb.txt");
     let colour = if colour.is_file() { read_list(&colour).ok() } else { None };
@@ -83,7 +83,7 @@ fn refuse_others_outside(recording: &Recording, root: &Path) -> Result<()> {
     files.try_for_each(|frame| inside(root, &frame.path).map(drop))
 }
 
-/// The recording on its way into another folder.
+/// The rewriting of a recording into another folder.
 pub(super) struct Rewrite<'a> {
     pub root: &'a Path,
     pub output: &'a Path,
@@ -91,17 +91,17 @@ pub(super) struct Rewrite<'a> {
     pub sensor: &'a Sensor,
     pub correction: Correction,
     pub table: DepthTable,
-    /// The code that is written.
+    /// The depth code to write.
     pub raw: RawCode,
-    /// Where images of the uncertainty go.
+    /// Folder for images of the uncertainty.
     pub sigma: Option<&'a Path>,
 }
 
-/// 10 um, so that 16 bit hold 0.65 m.
+/// Units of 10 um: 16 bits hold 0.65 m.
 pub const SIGMA_UNITS_PER_METRE: f64 = 1e5;
 pub(super) const SIGMA_FORMAT: &str = "kinoise-correction-sigma/1";
 
-/// What was done to one image, or why it could not be read.
+/// Statistics of one image, or why it could not be read.
 #[derive(Default)]
 struct Tally {
     measured: usize,
@@ -132,7 +132,7 @@ impl Rewrite<'_> {
         let tallies: Result<Vec<Tally>> = images.par_iter().map(each).collect();
         let corrected = self.sum(&tallies?, recording)?;
         copy(self.root, self.output, &last)?;
-        // A dump that keeps its code stays one, and fakenect's readers know no other description.
+        // A dump that keeps its code remains a dump; fakenect's readers know no other description.
         let assumed = self.layout != Layout::Dump && !self.root.join(DESCRIPTION).is_file();
         if self.recodes() || assumed {
             let sensor = Sensor { code: self.raw.code, ..self.sensor.clone() };
@@ -146,8 +146,8 @@ impl Rewrite<'_> {
         self.raw.code != self.sensor.code
     }
 
-    /// Everything but the depth images; of a dump in another code its index too, for it would say
-    /// that the raw values are a Kinect's.
+    /// All files except the depth images. A dump in another code also loses its index, which would claim that
+    /// the raw values are a Kinect's.
     fn other_files(&self, images: &[Image], described_by: &[PathBuf]) -> Result<Vec<PathBuf>> {
         if self.layout == Layout::Container {
             return Ok(Vec::new());
@@ -167,7 +167,7 @@ impl Rewrite<'_> {
         read_depth(&image.source, camera.width, camera.height)
     }
 
-    /// Depth, m, as it was and without its biases.
+    /// Depths before and after the correction, m.
     fn depths(&self, frame: &Frame, image: &Image) -> Result<(Vec<f32>, Vec<f32>)> {
         let before = self.table.depths(frame);
         let mut after = before.clone();
@@ -175,10 +175,10 @@ impl Rewrite<'_> {
         Ok((before, after))
     }
 
-    /// The greatest corrected depth, m.
+    /// Largest corrected depth, m.
     pub fn max_depth(&self, images: &[Image]) -> Result<f64> {
         let of = |image: &Image| -> Result<f64> {
-            // What cannot be read is remarked on when it is to be written.
+            // Unreadable images are reported when they are written.
             let Ok(frame) = self.read(image) else { return Ok(0.0) };
             let (_, depth) = self.depths(&frame, image)?;
             Ok(depth.iter().filter(|z| z.is_finite()).fold(0f32, |a, &b| a.max(b)).into())
@@ -191,7 +191,7 @@ impl Rewrite<'_> {
         let source = &image.source;
         let mut target = self.output.join(&image.file);
         let is_pgm = target.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
-        // Dumps in another code go on as a described sequence, whose images are PNGs.
+        // A dump in another code becomes a described sequence, whose images are PNGs.
         if is_pgm && self.recodes() {
             target.set_extension("png");
         }
@@ -223,7 +223,7 @@ impl Rewrite<'_> {
         let sigma = self.correction.uncertainty_m(depth_m, &image.conditions);
         let word = |s: &f32| match f64::from(*s) * SIGMA_UNITS_PER_METRE {
             units if units.is_nan() => 0,
-            // A certain depth is a depth still.
+            // Zero uncertainty must not read as a missing depth.
             units => units.round().clamp(1.0, f64::from(u16::MAX)) as u16,
         };
         let (width, height) = (self.sensor.camera.width, self.sensor.camera.height);
@@ -232,11 +232,11 @@ impl Rewrite<'_> {
         write_atomic(target, &encode_png16(&frame)?)
     }
 
-    /// Store corrected depths; what was no measurement stays none.
+    /// Stores the corrected depths; pixels without a measurement stay without one.
     fn recode(&self, frame: &mut Frame, before: &[f32], after: &[f32]) -> Tally {
         let mut tally = Tally::default();
         let none = self.raw.code.raw(f64::NAN);
-        // Half a px beyond is no other distance.
+        // Half a px beyond the range still counts as inside.
         let beyond = self.correction.learnt_px().map(|[low, high]| {
             [self.correction.scale_px_m / (high + 0.5), self.correction.scale_px_m / (low - 0.5)]
         });
@@ -256,7 +256,7 @@ impl Rewrite<'_> {
             *raw = nearest;
             tally.clamped += usize::from(clamped);
             tally.changed += usize::from(if self.recodes() { better != z } else { nearest != old });
-            // Beyond the code its end is what was done.
+            // A clamped depth counts with the depth that was stored.
             let stored = match clamped {
                 true => self.raw.code.metres(nearest).unwrap_or(0.0),
                 false => f64::from(better),
@@ -274,7 +274,7 @@ impl Rewrite<'_> {
         }
         let total = |of: fn(&Tally) -> usize| tallies.iter().map(of).sum::<usize>();
         let measured = total(|t| t.measured);
-        // In the order of the frames, whichever thread was first.
+        // Summed in frame order, whichever thread finished first.
         let square: f64 = tallies.iter().map(|t| t.square_m2).sum();
         let mut remarks = recording.remarks.clone();
         remarks.extend(self.correction.remarks().iter().cloned());

@@ -1,4 +1,4 @@
-//! A sigma image beside every depth image of a sequence, for those who weigh depths.
+//! Writes a sigma image for every depth image of a sequence, for use as weights.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -16,27 +16,27 @@ use crate::io::{encode_png16, write_atomic, write_json};
 use crate::model::NoiseModel;
 use crate::sequence::{Moment, Sequence};
 
-/// What was written.
+/// Statistics of the written images.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SigmaImages {
     pub frames: usize,
     /// Pixels with a depth, in all frames.
     pub measured: usize,
-    /// Those whose sigma is beyond what an image can hold, and written as the greatest number.
+    /// Pixels whose sigma exceeds the range of an image; its largest value is written.
     pub clamped: usize,
-    /// Those at a depth beyond the range where sigma was measured: its value at the edge is written.
+    /// Pixels at a depth outside the range where sigma was measured; sigma is held at the edge.
     pub beyond: usize,
     /// Mean sigma of the measured pixels, m.
     pub mean_m: f64,
 }
 
-/// The greatest number of an image.
+/// The largest value of an image.
 const TOP: f64 = 65535.0;
 
-/// Write into `output`: `sigma/*.png`, 16 bit, in units of 10 um ([`SIGMA_UNITS_PER_METRE`]), 0 where
-/// there is no depth; `sigma.txt`, their stamps and paths as TUM lists have them; `sigma.json`, which
-/// says what the numbers mean. An image has the name of its depth image.
-/// An error when the model is of another sensor, a depth image cannot be read, or `output` not written.
+/// Writes into `output` 16-bit `sigma/*.png` in units of 10 um ([`SIGMA_UNITS_PER_METRE`]), 0 where there is
+/// no depth; `sigma.txt`, a TUM list of their stamps and paths; and `sigma.json`, which describes the values.
+/// An image has the name of its depth image.
+/// Fails if the model is of another sensor, a depth image cannot be read, or `output` cannot be written.
 pub fn sigma_images(
     sequence: &Sequence,
     model: &NoiseModel,
@@ -103,7 +103,7 @@ impl SigmaImages {
     }
 }
 
-/// A measured pixel never reads as one without a depth.
+/// The value of a pixel. A measured pixel never gets the value for no depth.
 fn number(sigma_m: f64) -> u16 {
     if sigma_m.is_finite() {
         (sigma_m * SIGMA_UNITS_PER_METRE).round().clamp(1.0, TOP) as u16
@@ -112,7 +112,7 @@ fn number(sigma_m: f64) -> u16 {
     }
 }
 
-/// The depth images' names, where no two are the same; else their stamps.
+/// File names: those of the depth images if they are unique, otherwise the stamps.
 fn names(moments: &[Moment]) -> Vec<String> {
     let of = |m: &Moment| {
         let stem = m.depth.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -1,37 +1,37 @@
-//! How a measured surface leans at each pixel: planes in disparity over small windows.
+//! Local slope of a measured surface at each pixel: planes in disparity fitted to small windows.
 //!
-//! A window that lies across an edge fits badly; then the best of four that have the pixel in a
-//! corner is taken (Kuwahara 1976).
+//! A window across an edge fits badly. The best of the four windows with the pixel in a corner then
+//! replaces it (Kuwahara 1976).
 
 use rayon::prelude::*;
 
 use crate::model::SigmaModel;
 use crate::stats::SummedArea;
 
-/// Half a window's side, px: 13 x 13 px bring the slope's noise to a fiftieth of a pixel's a px.
+/// Half a window's side, px: 13 x 13 px reduce the noise of the slope to a fiftieth of a pixel's, per px.
 const HALF: usize = 6;
 const SIDE: usize = 2 * HALF + 1;
-/// A third of the window must be measured.
+/// Least number of measured pixels in a window: a third of it.
 const MIN_PIXELS: f64 = 56.0;
-/// A corner window is believed over the middle one when its variance is this much less: an F-ratio
-/// that noise over a hundred pixels does not reach.
+/// A corner window replaces the centred one if its variance is smaller by this factor. Noise over a hundred
+/// pixels does not reach this F-ratio.
 const MIN_F_RATIO: f64 = 3.0;
-/// A pixel farther from the plane than this many of its standard deviations is not of it.
+/// A pixel farther from the plane than this many standard deviations does not belong to it.
 const MAX_DEVIATIONS: f64 = 4.0;
-/// Variance (px^2) of pixels in a window along its narrower side: not a line of them.
+/// Least variance of the pixels of a window along its narrower side, px^2; rejects windows of a single line.
 const MIN_WIDTH: f64 = 1.0;
 
-/// The model's noise of a frontal surface, by disparity: a middle window no noisier than this
-/// needs no comparison.
+/// The model's noise of a frontal surface, by disparity. A centred window no noisier than this is accepted
+/// without comparison.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
-    /// Variance in px^2, a node a px of disparity.
+    /// Variance in px^2, one node per px of disparity.
     variance: Vec<f64>,
 }
 
-/// Nearer than 0.4 m no sensor of this kind measures: a Kinect has 109 px there.
+/// Number of nodes. No sensor of this kind measures nearer than 0.4 m, which is 109 px for a Kinect.
 const NODES: usize = 256;
-/// Of the model's variance, to let windows of a little more noise pass.
+/// Factor on the model's variance, so that slightly noisier windows pass.
 const TOLERANCE: f64 = 1.5;
 
 impl Noise {
@@ -45,7 +45,7 @@ impl Noise {
         Noise { variance: (0..NODES).map(variance).collect() }
     }
 
-    /// The largest variance of a window that needs no comparison, px^2, a node a px of disparity.
+    /// Largest variance of a window accepted without comparison, px^2, one node per px of disparity.
     pub fn limits(&self) -> &[f64] {
         &self.variance
     }
@@ -64,7 +64,7 @@ pub(super) struct Slopes {
 }
 
 impl Slopes {
-    /// Of `disparity` (px, NaN where there is none) of a pixel.
+    /// Fits the slopes of an image whose pixels have this `disparity`, px; NaN where there is none.
     pub fn of(
         width: usize,
         height: usize,
@@ -84,7 +84,7 @@ impl Slopes {
         Slopes { slopes }
     }
 
-    /// px per px along the columns and the rows; zero where there is no plane to be seen.
+    /// Slope along u and v, px per px; zero where no plane was found.
     pub fn at(&self, i: usize) -> [f64; 2] {
         self.slopes[i].map(f64::from)
     }
@@ -107,7 +107,7 @@ impl Windows {
     }
 
     fn slope(&self, u: usize, v: usize, d: f64, noise: &Noise) -> [f64; 2] {
-        // At the picture's border a window is moved in, not cut.
+        // At the image border a window is shifted inwards, not cropped.
         let span = |at: usize, before: usize, end: usize| {
             let first = at.saturating_sub(before).min(end.saturating_sub(SIDE));
             [first, (first + SIDE).min(end)]
@@ -141,12 +141,12 @@ struct LocalPlane {
     /// Means of u, v and d.
     centre: [f64; 3],
     slope: [f64; 2],
-    /// Of what it leaves, px^2.
+    /// Residual variance, px^2.
     variance: f64,
 }
 
 impl LocalPlane {
-    /// Least squares.
+    /// Least-squares fit; `None` for too few pixels or pixels too close to a line.
     fn of(sums: &Sums) -> Option<Self> {
         let n = sums[0];
         if n < MIN_PIXELS {
@@ -182,7 +182,7 @@ mod tests {
         Noise::of(&SigmaModel::paper(), 43.5)
     }
 
-    /// Numbers without a pattern, sd 0.1 px.
+    /// Pseudo-random values with a standard deviation of 0.1 px.
     fn ripple(i: usize) -> f64 {
         0.1 * (12.9898 * i as f64).sin() * std::f64::consts::SQRT_2
     }
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!(Slopes::of(W, H, lone, &noise()).at(700), [0.0; 2]);
     }
 
-    /// A step of 5 px down the middle: no pixel beside it takes the step for a slope.
+    /// A step of 5 px down the middle: no pixel beside it may take the step for a slope.
     #[test]
     fn an_edge_is_no_slope() {
         let d = |i: usize| if i % W < 30 { 30.0 } else { 25.0 } + ripple(i);

@@ -1,31 +1,31 @@
-//! How sure a correction is, pixel by pixel.
+//! Uncertainty of a correction, pixel by pixel.
 
 use std::collections::BTreeMap;
 
 use crate::model;
 use crate::terms::{Basis, Modulation, Needs, PixelContext, Term};
 
-/// The covariance of what a correction takes out.
+/// The covariance of the removed bias.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Uncertainty {
     shapes: Vec<Spread>,
-    /// The parts that err together, by the fit they are of and their number there.
+    /// Indices of the correlated factors, by fit and number within the fit.
     parts: BTreeMap<(u32, usize), usize>,
     pub needs: Needs,
 }
 
-/// One shape of it.
+/// The share of one term in the covariance.
 #[derive(Debug, Clone)]
 struct Spread {
     term: (Term, [f64; 2]),
-    /// What one standard deviation of a part makes of each coefficient: part, coefficients.
+    /// Index of a factor and the change of each coefficient per standard deviation of it.
     parts: Vec<(usize, Vec<f64>)>,
-    /// Variance of each coefficient's own; empty for none.
+    /// Independent variance of each coefficient; empty for none.
     own: Vec<f64>,
 }
 
 impl Uncertainty {
-    /// The terms of `entry` that are `usable`, learnt at these disparities.
+    /// Adds the `usable` terms of `entry`, learnt at these disparities.
     pub fn add(
         &mut self,
         entry: &model::Effect,
@@ -52,9 +52,9 @@ impl Uncertainty {
         }
     }
 
-    /// A law of the distance that references determined, and how well.
+    /// Adds a distance law that was determined from references, with its standard error.
     pub fn add_law(&mut self, entry: &model::Effect) {
-        // A drift's is that of its end.
+        // A drift has the error of its final value.
         let (name, times) = match entry.id.as_str() {
             "depth-scale" => ("scale", Modulation::Disparity),
             "disparity-offset" => ("offset_px", Modulation::One),
@@ -76,7 +76,7 @@ impl Uncertainty {
         self.shapes.is_empty()
     }
 
-    /// Variance at a place, px^2. `parts` is scratch.
+    /// Variance at a place, px^2. `parts` is scratch space.
     pub fn variance(&self, place: &PixelContext, parts: &mut Vec<f64>) -> f64 {
         parts.clear();
         parts.resize(self.parts.len(), 0.0);
@@ -91,7 +91,7 @@ impl Uncertainty {
     }
 }
 
-/// The place itself, or that with the last disparity at which the shape was learnt.
+/// The place, with its disparity clamped to where a shape that scales with disparity was learnt.
 pub(super) fn where_held(
     basis: &Basis,
     [low, high]: [f64; 2],

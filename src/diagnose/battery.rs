@@ -1,4 +1,4 @@
-//! What the layers show, as findings.
+//! Runs all layers and collects their findings.
 
 use serde_json::{Map, Value};
 
@@ -30,10 +30,10 @@ use super::verdict::{forget_impossible, merge, symptoms};
 use super::views::field::Field;
 use crate::terms::{Axis, Statistic, corner_radius};
 
-/// How noise hangs together changes what a few frames show of its size by so much.
+/// Error in the size of the noise, as a share, that its correlation can cause with few frames.
 const LEVEL_BESIDE_TEXTURE: f64 = 0.05;
 
-/// What one run of all layers shows.
+/// Results of one run of all layers.
 pub struct Battery {
     pub mean: MeanResult,
     pub scatter: ScatterResult,
@@ -41,22 +41,22 @@ pub struct Battery {
     pub found: Vec<Finding>,
     /// The refit of a sigma that was calibrated on these very views.
     pub refitted: Option<Finding>,
-    /// The form that sigma would follow better, in words.
+    /// Text on the form that sigma would follow better.
     pub better_form: Option<String>,
     /// Hard ends of the range.
     pub ends: Vec<Step>,
-    /// How small a loss would have been seen.
+    /// Smallest losses that would have been seen.
     pub detectable_losses: Vec<Detectable>,
 }
 
-/// Lines that were learnt are told by their profile alone.
+/// Reports learnt lines by their profile only.
 fn tell_lines_once(found: &mut Vec<Finding>) {
     let learnt = |f: &&Finding| f.statistic == Statistic::Bias && !f.terms.is_empty();
     let learnt: Vec<Axis> = found.iter().filter(learnt).map(|f| f.axis).collect();
     found.retain(|f| !(are_lines(f) && f.terms.is_empty() && learnt.contains(&f.axis)));
 }
 
-/// Of columns or rows that stand still, without a name.
+/// Whether it is a nameless mean error of columns or rows.
 fn are_lines(f: &Finding) -> bool {
     let of_lines = matches!(f.axis, Axis::Column | Axis::Row);
     f.effect.is_none() && f.statistic == Statistic::Bias && of_lines
@@ -68,8 +68,8 @@ fn curves(scenes: &[Scene<'_>; 2], outcomes: [&Outcome; 2]) -> Vec<Finding> {
     layers.flat_map(|(scene, outcome)| findings::findings(scene, outcome)).collect()
 }
 
-/// Period of the finest of the three waves by which pixel-locking is looked for, px: those of a coarser step's
-/// staircase are among them.
+/// Finest of the three wave periods searched for pixel-locking, px; the staircase of a coarser step contains
+/// such waves.
 const LOCKING_WAVE_PX: f64 = 0.33;
 
 impl Case<'_> {
@@ -83,7 +83,7 @@ impl Case<'_> {
         ]
     }
 
-    /// All layers, one after the other.
+    /// Runs all layers, one after the other.
     pub fn battery(&mut self) -> Battery {
         let mut mean = self.mean();
         let scatter = self.scatter(&mut mean);
@@ -104,7 +104,7 @@ impl Case<'_> {
         drop(scenes);
         let refitted = self.take_refit(&mut curves);
         curves.retain(|f| self.is_news(f, &scatter));
-        // Laws are fitted beside what is told.
+        // Laws are fitted with the bias terms that are reported.
         let mut bias = mean.terms.clone();
         curves.retain(|f| {
             let of_mean = f.statistic == Statistic::Bias;
@@ -117,7 +117,7 @@ impl Case<'_> {
             forget_noise_of_frames(&mut curves, &textures, &self.fields);
             fold_into_sigma(&mut curves);
         }
-        // Nats, as long as they are not shares.
+        // Shares are still in nats.
         let clear = scatter.outcome.noise.threshold(self.options.level);
         let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
         let better_form = self.tell_form(&mut curves, clearly);
@@ -125,7 +125,7 @@ impl Case<'_> {
         let mut found: Vec<Finding> = read.chain(curves).collect();
         let of_size = |f: &Finding| f.statistic == Statistic::Variance;
         let told = self.baseline.is_some() && found.iter().any(of_size);
-        // Of two recordings what the search of the size tells is not told of its parts again.
+        // Between two recordings, what the search of the size reports is not reported again for its parts.
         found.extend(textures.into_iter().filter(|f| !(told && of_size(f) && f.effect.is_none())));
         let DropoutOutcome { findings, detectable: mut detectable_losses, ends, notes } = lost;
         self.remarks.extend(notes);
@@ -146,19 +146,20 @@ impl Case<'_> {
         Battery { mean, scatter, found, refitted, better_form, ends, detectable_losses }
     }
 
-    /// The simulated views beside these, one each.
+    /// The simulated views, one for each of these.
     fn twins(&self) -> Option<&[Field]> {
         self.baseline.as_ref().map(|b| &b.fields[..])
     }
 
-    /// Steps shift the mean within a step, and gross errors add to the variance: none of it is news.
+    /// Whether a finding is more than a consequence of steps, which shift the mean within a step, or of gross
+    /// errors, which add to the variance.
     fn is_news(&self, f: &Finding, scatter: &ScatterResult) -> bool {
         let coarsest = self.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
         let sigma_px = typical_sigma_px(&self.fields);
-        // A fine step errs as noise does, and shifts the mean by less than a four hundredth.
+        // A fine step acts like noise and shifts the mean by less than a four-hundredth.
         let of_steps = matches!(f.statistic, Statistic::Bias | Statistic::Variance)
             && coarsest > COARSE_SIGMAS * sigma_px;
-        // Steps of depth come at no period of the disparity, and pass for one over a few of them.
+        // Steps of depth have no period in the disparity, but a few of them look periodic.
         let aliases = self.lattice.depth.is_some()
             || self.lattice.disparity.is_some_and(|step| step.size > LOCKING_WAVE_PX);
         let aliased = aliases && f.axis == Axis::DisparityPhase;
@@ -176,7 +177,7 @@ impl Case<'_> {
         !stepped && !tailed
     }
 
-    /// Is what was measured clearly more than twice of what the model has?
+    /// Whether the measured values are clearly more than twice the model's.
     fn is_more(&self, families: &[&'static str], parameters: &Map<String, Value>) -> bool {
         let more = |id: &&str| {
             parameters.iter().all(|(name, measured)| {
@@ -188,7 +189,7 @@ impl Case<'_> {
         families.iter().all(|id| !self.known.has(id) || more(id))
     }
 
-    /// What neither a mean nor a variance shows: how the noise hangs together, tails, steps.
+    /// Findings that neither a mean nor a variance shows: correlation of the noise, tails, steps.
     fn texture(
         &self,
         mean: &MeanResult,
@@ -208,7 +209,7 @@ impl Case<'_> {
         };
         let textures = textures.map(told).chain(self.overstated(scatter));
         let mut found: Vec<Finding> = textures.chain(steps).collect();
-        // Lines that stand still have no name, but they are learnt.
+        // Fixed lines have no name, but they are learnt.
         let has_pattern = scatter.textures.iter().any(|t| t.families.contains(&FIXED_PATTERN));
         let pattern_px2 = if has_pattern { pattern_px2(&scatter.structure) } else { 0.0 };
         for f in found.iter_mut().filter(|f| are_lines(f)) {
@@ -219,8 +220,8 @@ impl Case<'_> {
         found
     }
 
-    /// What a few views have alone. Two runs of a world of light differ view by view for no reason
-    /// that could be told.
+    /// Effects that only a few views have. Not searched between two recordings: two runs of a light
+    /// simulation differ view by view for no identifiable reason.
     fn few_views(
         &self,
         [mean, scatter]: &[Scene<'_>; 2],
@@ -245,16 +246,16 @@ impl Case<'_> {
             let rules = survey.variance_rules(level);
             few_views(scatter, &scatter.data, &candidates, outcomes[1], &rules, &[], seed)
         };
-        // Where the words step, so does the mean of every view, at places of its own.
+        // Where the words step, the mean of every view steps too, at places of its own.
         let bias = (!stepped).then(bias).flatten();
-        // And its noise, from view to view, about a sigma that other views taught.
+        // So does its noise, from view to view, about a sigma learnt from other views.
         let taught = survey.learnt_from[1].is_some();
         let variance = (!(stepped && taught)).then(variance).flatten();
         bias.into_iter().chain(variance).collect()
     }
 
-    /// The refit of a sigma that was calibrated here is no finding; the extended model has it, for all
-    /// else was fitted beside it.
+    /// Takes out the refit of a sigma that was calibrated here. It is no finding, but the extended model has
+    /// it because all else was fitted with it.
     fn take_refit(&self, curves: &mut Vec<Finding>) -> Option<Finding> {
         if !self.survey.refits_sigma {
             return None;
@@ -263,8 +264,7 @@ impl Case<'_> {
         Some(curves.remove(at))
     }
 
-    /// Where sigma's own form is off, the form that would do better: beside the finding, and as a
-    /// remark.
+    /// Tells which form would fit better where sigma's own does not: in the finding, and as a remark.
     fn tell_form(&self, curves: &mut [Finding], refitted: bool) -> Option<String> {
         let told = curves.iter_mut().find(|f| f.status == Status::Recalibrate);
         if self.baseline.is_some() || told.is_none() && !refitted {
@@ -277,7 +277,7 @@ impl Case<'_> {
         Some(format!("sigma over depth and tilt follows better: {better}"))
     }
 
-    /// Losses that neither the model has nor the simulation.
+    /// Losses that neither the model nor the simulation has.
     fn lost(&self) -> DropoutOutcome {
         let seen_by = (&self.sensor().camera, &self.bench.rays);
         let twins = self.baseline.as_ref().map(|b| (&b.fields[..], &b.survey));
@@ -286,7 +286,7 @@ impl Case<'_> {
         let mut lost = self.losses.get_or_init(search).clone();
         let alike = self.baseline.as_ref().is_some_and(|b| b.loses_alike(&self.survey));
         lost.findings.retain(|m| {
-            // What lies beside the target is no tile's.
+            // Losses beside the target are not in any tile.
             let on_target = m.effect != Some("occlusion-shadow");
             m.effect.is_none_or(|id| !self.known.has(id))
                 && m.p_adjusted.is_some_and(|p| self.stands(p, missing::LEVEL))

@@ -1,4 +1,4 @@
-//! A diagnosis under way: the views as they were read, and the searches of their mean and scatter.
+//! A diagnosis in progress: the views as read, and the search of their mean.
 
 use std::sync::{Arc, OnceLock};
 
@@ -26,7 +26,7 @@ use crate::model::NoiseModel;
 use crate::terms::{Basis, Statistic, Term};
 use crate::view::{Excluded, Recording, Sensor};
 
-/// A diagnosis under way.
+/// A diagnosis in progress.
 pub struct Case<'a> {
     pub recording: &'a Recording,
     pub model: &'a NoiseModel,
@@ -37,37 +37,37 @@ pub struct Case<'a> {
     pub fields: Vec<Field>,
     pub survey: Survey,
     pub baseline: Option<Baseline>,
-    /// What the means that are taken out leave of a still pattern.
+    /// Share of a fixed pattern that remains after the means are subtracted.
     pub kept: KeptPattern,
-    /// What the words step by.
+    /// Steps of the raw words.
     pub lattice: Quantisation,
-    /// Losses: the second run's are the first's, whose sigma says how hard an end of the range is.
+    /// Losses. The second run reuses those of the first, whose sigma tells how hard an end of the range is.
     pub losses: OnceLock<DropoutOutcome>,
     pub excluded: Vec<Excluded>,
-    /// What was odd about the views, in words.
+    /// Remarks on the views.
     pub remarks: Vec<String>,
-    /// Found while reading: the words are ranges.
+    /// Finding made while reading: the raw values are ranges.
     pub ranges: Option<Finding>,
-    /// Found in every image alone, and taken out while reading.
+    /// Finding made in single images; the steps were subtracted while reading.
     pub column_steps: Option<Finding>,
-    /// Views that the model's bias, and its sigma, were learnt from, where these are others.
+    /// Views that the model's bias and its sigma were learnt from, where they differ from these.
     pub learnt_from: [Option<Learnt>; 2],
-    /// The model has what a first run found.
+    /// Whether the model includes what a first run found.
     pub extended: bool,
 }
 
-/// What the residuals' mean shows.
+/// Results on the mean of the residuals.
 pub struct MeanResult {
     pub outcome: Outcome,
     pub terms: Vec<Term>,
-    /// Of single columns and rows, which the search does not see.
+    /// Profiles of single columns and rows, which the search does not see.
     pub lines: Vec<LearntLines>,
     /// The terms and the lines at every pixel, px.
     pub px: Vec<Vec<f32>>,
 }
 
 impl MeanResult {
-    /// Searched or not.
+    /// Terms of the search, and of the lines.
     pub fn all_terms(&self) -> Vec<Term> {
         let lines = self.lines.iter().map(|l| &l.profile);
         self.terms.iter().chain(lines).cloned().collect()
@@ -130,8 +130,7 @@ impl<'a> Case<'a> {
         })
     }
 
-    /// The same views once more, with other residuals and against another model. They are worth no less than
-    /// they were.
+    /// Same views with new residuals and another model; their weights do not decrease.
     pub fn again<'b>(self, fields: Vec<Field>, model: &'b NoiseModel) -> Case<'b>
     where
         'a: 'b,
@@ -139,12 +138,12 @@ impl<'a> Case<'a> {
         let known = KnownTerms::of(model, &self.sensor().camera);
         let learnt = (self.learnt_from, &known);
         let weights = self.survey.weights();
-        // Two surveys at once are a quarter of the memory of all.
+        // Two surveys at once are a quarter of all memory.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
         let views = (&fields[..], &self.kept);
         let mut survey = survey(views, bench, baseline, self.options, learnt, model);
-        // What remains is counted by no less than what was explained was counted by.
+        // What remains is weighted at least as much as what was explained.
         if baseline.is_none() {
             survey.weigh_more(weights);
         }
@@ -161,7 +160,8 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// Tells what begins: in the first run of the battery, or in the one against the extended model.
+    /// Reports the stage that begins: `first` in the first run of the battery, `again` in the one against the
+    /// extended model.
     pub fn at(&self, first: &'static str, again: &'static str) {
         self.progress.stage(if self.extended { again } else { first });
     }
@@ -170,8 +170,8 @@ impl<'a> Case<'a> {
         &self.recording.sensor
     }
 
-    /// One error rate for everything: this share of it to the mean, a quarter to the variance, a tenth to the laws,
-    /// and to each of some 20 others so much that all come to a rate and a sixth, were they independent.
+    /// Shares of the overall false-alarm rate: 0.4 for the mean, a quarter for the variance, a tenth for
+    /// the laws, and `EACH_LEVEL` for each of some 20 others. If independent, all add up to 7/6 of the rate.
     pub const MEAN_LEVEL: f64 = 0.4;
     pub const VARIANCE_LEVEL: f64 = 0.25;
     pub const EACH_LEVEL: f64 = 0.02;
@@ -187,11 +187,11 @@ impl<'a> Case<'a> {
         let seed = self.options.seed;
         let mut fine = self.survey.mean_data();
         let mut found = self.survey.search_bias(&fine, camera, level, seed);
-        // The second run begins with what views were worth in the first.
+        // The second run starts with the weights of the first.
         let first = self.baseline.is_none() && !self.extended;
         if first && self.options.ablation == Ablation::None {
-            // What is steep in a bias was taken for noise that hangs together: views count for more
-            // once it is known, as the search alone has it.
+            // Steep parts of a bias were taken for correlated noise: views weigh more once the bias is
+            // known, as found by the search alone.
             let (_, px) = self.everywhere(&found);
             if self.survey.reweigh(&self.fields, &px) {
                 fine = self.survey.mean_data();
@@ -204,24 +204,24 @@ impl<'a> Case<'a> {
         MeanResult { outcome, terms, lines: Vec::new(), px }
     }
 
-    /// The terms of the mean, and what they are at every pixel, px.
+    /// Terms of the mean, and their sum at every pixel, px.
     fn everywhere(&self, outcome: &Outcome) -> (Vec<Term>, Vec<Vec<f32>>) {
         let terms = terms_of(outcome, Statistic::Bias);
         let px = pixel_terms(&self.fields, &terms, &self.survey, &self.bench);
         (terms, px)
     }
 
-    /// Is this chance, of noise alone, small enough where the model's own views left something open
-    /// as well?
+    /// Whether a p-value under noise alone is still below `level` once what the model's own views may have
+    /// missed is allowed for.
     pub fn stands(&self, p: f64, level: f64) -> bool {
         let views = self.fields.len() as f64;
         self.learnt_from[1].map_or(p, |model| model.p(p, views)) <= level
     }
 
-    /// Where the halves of the views do not agree, chance is the likelier: a curve or a law must then be as
-    /// clear as a tenth of its level, `share` of the whole. Of 1167 sets of the development seeds 1127, 3521
-    /// and 3607, 26 findings had such halves, and 23 were as clear; of the three others one was of no cause.
-    /// The maps of the joint fit have a chance of another kind.
+    /// Whether a finding stands despite its halves. Where the halves of the views do not agree, a curve or a
+    /// law must be significant at a tenth of its level, `share` of the whole. In 1167 sets of the development
+    /// seeds 1127, 3521 and 3607, 26 findings had such halves, and 23 were as clear; of the three others one
+    /// had no cause. The maps of the joint fit have another kind of p-value.
     pub fn halves_allow(&self, f: &Finding, share: f64) -> bool {
         const DISAGREEING: f64 = 0.1;
         let clear = |p: f64| p < DISAGREEING * self.level(share);
@@ -229,12 +229,12 @@ impl<'a> Case<'a> {
         maps || f.replicated != Some(false) || f.p_adjusted.is_none_or(clear)
     }
 
-    /// What reading as ranges took out of the means.
+    /// Terms subtracted from the means by reading the raw values as ranges.
     pub fn taken_out(&self) -> Vec<Term> {
         self.ranges.iter().flat_map(|f| f.terms.clone()).collect()
     }
 
-    /// Takes that out the other way round: the means are as stored again.
+    /// Same with the opposite sign: subtracting these restores the means as stored.
     pub fn as_stored(&self) -> Vec<Term> {
         self.taken_out().iter().map(|t| t.times(-1.0)).collect()
     }

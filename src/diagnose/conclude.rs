@@ -1,4 +1,4 @@
-//! From findings to the diagnosis.
+//! Turns findings into the diagnosis.
 
 use super::battery::Battery;
 use super::case::Case;
@@ -52,7 +52,7 @@ impl Case<'_> {
         remarks
     }
 
-    /// Runs all layers and puts together what they come to.
+    /// Runs all layers and assembles the diagnosis.
     pub fn conclude(mut self) -> Diagnosed {
         let Battery { mean, scatter, mut found, refitted, better_form, ends, detectable_losses } =
             self.battery();
@@ -98,7 +98,7 @@ impl Case<'_> {
             None => Reference::Model,
         };
         let (after, mut done) = match tested {
-            // Where nothing was found the model is the extended one, and was tested.
+            // Where nothing was found, the model is the extended one and has been tested.
             Some(tested) => {
                 let verdict = if verdict == Verdict::Inconclusive { verdict } else { tested };
                 (After { verdict, remaining: Vec::new() }, self)
@@ -131,8 +131,8 @@ impl Case<'_> {
         }
     }
 
-    /// Views that were left out are no match: where they are more than the others, nothing found in those
-    /// says nothing of the recording.
+    /// Verdict. A match becomes inconclusive where more views were left out than used: the views used do not
+    /// represent the recording.
     fn verdict(&self, found: &[Finding], outcomes: [&Outcome; 2]) -> Verdict {
         match verdict(found, outcomes) {
             Verdict::Match if self.few_are_left().is_some() => Verdict::Inconclusive,
@@ -150,8 +150,8 @@ impl Case<'_> {
         })
     }
 
-    /// The views that would settle names that are in doubt, where depth comes back: not beyond these `ends`,
-    /// and not where a dropout over distance or tilt, found or known, takes it.
+    /// Suggests views that would settle names in doubt, where depth is measured: not beyond these `ends`, and
+    /// not where a dropout over distance or tilt, found or known, removes it.
     fn advise(
         &self,
         found: &mut [Finding],
@@ -170,7 +170,7 @@ impl Case<'_> {
         }
     }
 
-    /// The biases learnt here leave distances as the references have them, or as they were.
+    /// Makes the biases learnt here leave distances as the references have them, or as they were.
     fn anchor(&self, extended: &mut NoiseModel) {
         let camera = &self.sensor().camera;
         let known = KnownTerms::of(extended, camera);
@@ -188,8 +188,8 @@ impl Case<'_> {
         }
     }
 
-    /// What `extended` learnt here rests on: how its terms differ from view to view, and how much was
-    /// looked at.
+    /// Records what the terms `extended` learnt here rest on: their scatter from view to view, and how many
+    /// views and references were used.
     fn sample(&self, extended: &mut NoiseModel) {
         let added = &mut extended.effects[self.model.effects.len()..];
         for statistic in [Statistic::Bias, Statistic::Variance] {
@@ -222,7 +222,7 @@ impl Case<'_> {
         layers.flat_map(|(scene, outcome)| findings::map(scene, outcome, level)).collect()
     }
 
-    /// The views, for people.
+    /// Summary lines of the views.
     fn view_lines(&self, bias: &[Term], heldout: Option<&HeldOut>) -> Vec<ViewLine> {
         let before = rms::rms_by_view(&self.survey, &self.as_stored());
         let after = rms::rms_by_view(&self.survey, bias);

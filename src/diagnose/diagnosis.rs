@@ -1,4 +1,4 @@
-//! What a diagnosis says: `diagnosis.json` (`crate::docs::layouts`).
+//! Contents of a diagnosis: `diagnosis.json` (`crate::docs::layouts`).
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -105,38 +105,38 @@ pub struct Finding {
     pub covariance: Covariance,
 }
 
-/// In words: so many of the views, of so many that were measured.
+/// Text for `some` of `all` measured views.
 pub(super) fn in_some_views([some, all]: [usize; 2]) -> String {
     format!("in {some} of {all} views")
 }
 
 impl HeldOut {
-    /// Without the views kept aside the searches find nothing, or nothing that is scored was found.
+    /// Whether the searches find nothing without the held-out views, or nothing that is scored.
     pub fn is_nothing(&self) -> bool {
         self.gain_interval == [0.0; 2]
     }
 }
 
 impl Finding {
-    /// A law of the distance rests on a number a view, where the others rest on every pixel: that its nats
-    /// are few says nothing of its size.
+    /// Whether it is a law of the distance. Such a law rests on one number per view, others on every pixel,
+    /// so few nats do not mean that it is small.
     pub fn is_law(&self) -> bool {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
     }
 
-    /// In how many of the views it is, in words, where not all have it.
+    /// Text on how many views have it, where not all do.
     pub fn which_views(&self) -> Option<String> {
         self.of_some.map(in_some_views)
     }
 
-    /// What was found of a parameter, without its error.
+    /// Measured value of a parameter, without its error.
     pub fn value(&self, parameter: &str) -> Option<f64> {
         self.parameters.get(parameter)?.get("value")?.as_f64()
     }
 
-    /// The effect of the catalogue that shows as this finding does, for the simulator: what was not
-    /// measured is typical. `None` for what has no name, and where the strength is not known or
-    /// beyond what the formula takes.
+    /// Effect of the catalogue that reproduces this finding in the simulator, with typical values for
+    /// parameters that were not measured. `None` without a name, and where the strength is unknown or outside
+    /// the formula's range.
     pub fn as_effect(&self) -> Option<Active> {
         let named = matches!(self.status, Status::Named | Status::OneOf);
         let mut active = Active::typical(self.effect.filter(|_| named)?).ok()?;
@@ -146,7 +146,7 @@ impl Finding {
             match self.value(knob.name) {
                 Some(v) if n > 0 => active = active.with(knob.name, v.clamp(low, high)).ok()?,
                 Some(v) => active = active.with(knob.name, v).ok()?,
-                // A share that is not said is the whole.
+                // An unstated share is the whole.
                 None if n == 0 && knob.name != "share" => return None,
                 None => {}
             }
@@ -198,11 +198,12 @@ pub struct NextView {
 }
 
 impl NextView {
-    /// Of 22 views with this chance or more 16 settled the name, of 7 with .5 to .7 two (development
-    /// seeds 4202 and 4303): the formulas that views are drawn by are not those of the sets.
+    /// Least chance of a view that is likely to settle the name. Of 22 views with this chance or more 16
+    /// settled it, of 7 with .5 to .7 two (development seeds 4202 and 4303): the formulas used in the
+    /// simulation of views are not those of the sets.
     const LIKELY: f64 = 0.7;
 
-    /// Is it worth a person's minute for this alone?
+    /// Whether the view is worth taking for this alone.
     pub fn is_likely_to_settle(&self) -> bool {
         self.chance >= Self::LIKELY
     }

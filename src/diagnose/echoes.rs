@@ -1,12 +1,12 @@
-//! A sigma that is off, beside what else was found: its own laws belong to it, and what it only repeats does
-//! not come before the cause.
+//! A finding that sigma is off, next to other findings: laws of depth or tilt are folded into it, and it does
+//! not rank before a cause that it merely echoes.
 
 use super::diagnosis::{Finding, Status};
 use super::views::field::Field;
 use crate::terms::{Axis, Statistic};
 
-/// Where sigma itself is off by more, a law of depth or tilt alone beside it is the rest of the same
-/// misfit: its terms, and nats, go to that finding.
+/// Folds weaker laws of depth or tilt alone into the finding that sigma is off: they are the rest of the
+/// same misfit. Their terms and nats go to that finding.
 pub(super) fn fold_into_sigma(found: &mut Vec<Finding>) {
     let Some(at) = found.iter().position(|f| f.status == Status::Recalibrate) else { return };
     let mut sigma = found.remove(at);
@@ -21,8 +21,8 @@ pub(super) fn fold_into_sigma(found: &mut Vec<Finding>) {
     found.insert(at.min(found.len()), sigma);
 }
 
-/// A frame that is noisier than the others is in the size of all: where that accounts for at least half of
-/// what sigma is off by, only the frame is reported.
+/// Drops the finding that sigma is off where a noisier frame accounts for at least half of it; then only the
+/// frame is reported.
 pub(super) fn forget_noise_of_frames(
     found: &mut Vec<Finding>,
     textures: &[Finding],
@@ -42,7 +42,7 @@ fn of_sigma_alone(f: &Finding) -> bool {
     f.statistic == Statistic::Variance && axis && f.effect.is_none_or(|id| id == "range-exponent")
 }
 
-/// What adds to the spread of one frame, and so to a sigma that was calibrated with it in place.
+/// Effects that add to the spread of one frame, and so to a sigma calibrated with them present.
 const SPREADS: [&str; 6] = [
     "fixed-pattern-noise",
     "frozen-noise",
@@ -53,15 +53,15 @@ const SPREADS: [&str; 6] = [
 ];
 
 fn spreads(f: &Finding) -> bool {
-    // The size of a texture that some views have is theirs; a mean error's is all views'.
+    // The size of a texture in some views is that in these; the size of a mean error is that in all views.
     let of_all =
         f.of_some.is_none() || f.statistic == Statistic::Bias && f.axis != Axis::EdgeDistance;
     let named = matches!(f.status, Status::Named | Status::OneOf) && of_all;
     named && (f.statistic == Statistic::Bias || f.effect.is_some_and(|id| SPREADS.contains(&id)))
 }
 
-/// A sigma that is too large was calibrated with the named causes in it: of such a finding only
-/// what they do not account for counts, in variance.
+/// Reduces the finding that sigma is too large to the variance that the named causes do not account for:
+/// sigma was calibrated with them present.
 pub(super) fn echoes(found: &mut [Finding]) {
     let explained: f64 = found.iter().filter(|f| spreads(f)).map(|f| f.size.sigma.powi(2)).sum();
     let largest = found.iter().filter(|f| spreads(f)).map(|f| f.share).fold(0.0, f64::max);
@@ -76,11 +76,11 @@ pub(super) fn echoes(found: &mut [Finding]) {
     }
 }
 
-/// From this share on a cause accounts for what sigma is off by.
+/// Share of sigma's error from which on a cause accounts for it.
 const HALF: f64 = 0.5;
 
-/// By how much the model's variance exceeds what was measured, in units of the model's; negative
-/// where sigma is too small.
+/// Excess of the model's variance over the measured one, in units of the model's; negative where sigma is
+/// too small.
 fn excess(f: &Finding) -> f64 {
     let Some(curve) = f.curve.as_ref().filter(|c| !c.model.is_empty()) else { return 0.0 };
     let mean = curve.model.iter().map(|ratio| ratio * ratio).sum::<f64>();
@@ -117,7 +117,7 @@ mod tests {
         }
     }
 
-    /// The smaller of the two is the rest of the larger one's misfit; not the other way round.
+    /// A smaller law is folded into the larger misfit of sigma, but not the other way round.
     #[test]
     fn a_law_of_the_depth_beside_a_larger_misfit_of_sigma_is_part_of_it() {
         for (nats, left) in [(100.0, 1), (2000.0, 2)] {
@@ -130,8 +130,8 @@ mod tests {
         }
     }
 
-    /// Sigma calibrated with a bias of half its size in it; then too small a sigma, which no bias
-    /// explains.
+    /// First a sigma calibrated with a bias of half its size present, then one that is too small, which no
+    /// bias explains.
     #[test]
     fn the_echo_of_a_cause_never_comes_before_it() {
         let mut found = vec![recalibrate(0.75f64.sqrt()), bowl(0.5)];

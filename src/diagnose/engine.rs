@@ -13,22 +13,21 @@ use crate::view::{Excluded, Recording};
 /// A finished diagnosis.
 pub struct Diagnosed {
     pub diagnosis: Diagnosis,
-    /// The model with what was found.
+    /// The model extended with the findings.
     pub model: NoiseModel,
-    /// The views, but for their single frames.
+    /// The views without their single frames.
     pub fields: Vec<Field>,
     /// The bias that was found, at every pixel of every field, px; empty where there is none.
     pub bias_px: Vec<Vec<f32>>,
     pub excluded: Vec<Excluded>,
-    /// What was taken out while reading: of ranges that raw values turned out to hold.
+    /// Terms subtracted while reading, where the raw values turned out to be ranges.
     pub taken_out: Vec<Term>,
     /// The simulated views, where there are any, in the same order.
     pub against: Vec<Field>,
 }
 
 impl Diagnosed {
-    /// Mean residual of every pixel of a view, beyond the simulated one's where there is one, px: as it was
-    /// read.
+    /// Mean residual of every pixel of a view as read, minus the simulated view's where there is one, px.
     pub fn read(&self, view: usize) -> Vec<f32> {
         let field = &self.fields[view];
         let Some(twin) = self.against.get(view) else { return field.mean.clone() };
@@ -40,7 +39,7 @@ impl Diagnosed {
     }
 }
 
-/// Find out what `model` leaves out of `recording`.
+/// Finds what `model` leaves out of `recording`.
 ///
 /// # Errors
 /// When fewer than three views can be used.
@@ -53,8 +52,8 @@ pub fn diagnose(
     Ok(Case::open(recording, None, model, options, progress)?.conclude())
 }
 
-/// Find out what a simulation leaves out: `simulated` is its recording of the same views, `model`
-/// the sigma to weigh by.
+/// Finds what a simulation leaves out: `simulated` is its recording of the same views, `model` gives the
+/// sigma for the weights.
 ///
 /// # Errors
 /// When another sensor was simulated, or fewer than three views have a partner.

@@ -1,10 +1,10 @@
-//! When simulation and recording differ: where, why, and what is gained by knowing.
+//! Diagnoses differences between simulation and recording: where, why, and what is gained by knowing.
 //!
-//! `engine` starts, `case` holds the views, `battery` runs the tests and `conclude` says what they come to.
-//! `views` makes residuals of recordings; `search` and `joint` find what the mean and the size of the
-//! noise have too much; `noise`, `steps`, `edges`, `missing` and `distance` look at the rest; `against` holds a
-//! simulated recording beside them; `finding` puts results into names, numbers and words; `checks` are what a
-//! finding must stand. How it all works: [`crate::docs::engine`].
+//! `engine` is the entry point, `case` holds the views, `battery` runs the tests and `conclude` assembles the
+//! results. `views` turns recordings into residuals; `search` and `joint` search the mean and the size of the
+//! noise for missing effects; `noise`, `steps`, `edges`, `missing` and `distance` cover the rest; `against`
+//! compares with a simulated recording; `finding` turns results into names, numbers and text; `checks` test
+//! findings. How it all works: [`crate::docs::engine`].
 
 mod against;
 mod battery;

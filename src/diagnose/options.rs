@@ -1,4 +1,4 @@
-//! Settings of a diagnosis, and the few numbers that all its parts go by.
+//! Settings of a diagnosis, and the constants shared by its parts.
 
 use crate::measure::MeasureOptions;
 use crate::rng::Seed;
@@ -7,12 +7,12 @@ use crate::rng::Seed;
 #[derive(Debug, Clone, Copy)]
 pub struct DiagnoseOptions {
     pub seed: Seed,
-    /// Chance that a clean recording is said to have anything wrong.
+    /// Probability of any false alarm on a clean recording.
     pub level: f64,
-    /// The model was calibrated on this very recording, causes and all: sigma is refitted beside
-    /// whatever is found, and that is no finding.
+    /// Whether the model was calibrated on this very recording, with all causes present: sigma is then
+    /// refitted with everything found, and the refit is no finding.
     pub calibrated_here: bool,
-    /// Nothing, but in tests of what each part is for.
+    /// Part left out, for ablation tests only.
     pub ablation: Ablation,
 }
 
@@ -32,19 +32,19 @@ impl Default for DiagnoseOptions {
 pub enum Ablation {
     #[default]
     None,
-    /// Every pixel of every frame counts as a sample of its own, whatever it shares with others.
+    /// Every pixel of every frame counts as an independent sample.
     NoCorrelation,
-    /// What gains a nat on views left out is there, as Akaike has it for one parameter: no
-    /// simulation of noise alone through the whole search.
+    /// A gain of one nat on held-out views is significant, as by Akaike for one parameter; noise alone is
+    /// not simulated through the whole search.
     UncalibratedThresholds,
 }
 
-/// Fewest views that anything is said about.
+/// Least number of views for a diagnosis.
 pub const MIN_VIEWS: usize = 3;
-/// Single frames kept whole: enough for correlations in time.
+/// Number of single frames kept: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 
-/// Standard deviations that 80 % of a Gaussian lie above, below its mean.
+/// The 80 % quantile of a standard normal distribution.
 pub const POWER_80: f64 = 0.84;
 
 pub fn measure_options(options: &DiagnoseOptions) -> MeasureOptions {

@@ -1,5 +1,5 @@
-//! Residuals of a few views as pictures: as recorded, with what was found taken out, and of the
-//! view's twin. Computed here, drawn elsewhere.
+//! Residuals of a few views as pictures: as recorded, with the bias found subtracted, and of the view's
+//! twin. Computed here, drawn elsewhere.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -17,27 +17,27 @@ use crate::view::Sensor;
 /// One view, row by row, mm of depth, measured minus the plane; NaN off the target.
 #[derive(Debug, Clone)]
 pub struct ViewPictures {
-    /// Number among the diagnosed views.
+    /// Index among the diagnosed views.
     pub view: usize,
     pub width: usize,
     pub height: usize,
     /// Mean over the frames about the view's plane.
     pub before: Vec<f32>,
-    /// Without the bias that was found, about a plane fitted anew.
+    /// Without the bias found, about a refitted plane.
     pub after: Vec<f32>,
     /// The twin, measured as the recording was.
     pub twin: Option<Vec<f32>>,
 }
 
-/// Takes a view again: its number and its field to frames and their times since the first, s.
+/// Retakes a view: maps its number and field to frames and their times since the first, s.
 pub type Retake<'a> = &'a (dyn Fn(usize, &Field) -> Option<Vec<(f64, Frame)>> + Sync);
 
-/// More views tire the reader.
+/// Number of views shown; more tire the reader.
 const VIEWS: usize = 3;
-/// Wider pictures only show grain, px.
+/// Width of the widest picture, px; wider ones only show grain.
 const WIDEST: usize = 400;
 
-/// Of the views that changed most, spread over the distances. `model` is the one that was given.
+/// Pictures of the views that changed most, spread over the distances. `model` is the one diagnosed.
 pub fn pictures(
     done: &Diagnosed,
     sensor: &Sensor,
@@ -78,7 +78,7 @@ pub fn pictures(
         .collect()
 }
 
-/// The nearest, middle and farthest third of the views, the most changed view of each.
+/// The most changed view of each of the nearest, middle and farthest third of the views.
 fn worth_seeing(done: &Diagnosed) -> Vec<usize> {
     let lines = &done.diagnosis.views;
     let mut order: Vec<usize> = (0..lines.len().min(done.fields.len())).collect();
@@ -92,7 +92,7 @@ fn worth_seeing(done: &Diagnosed) -> Vec<usize> {
         .collect()
 }
 
-/// Minus the plane that is left in `values`.
+/// Subtracts the plane that is left in `values`.
 fn about_plane(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
     let at = |i: u32| {
         let (x, y) = rays.at(i as usize);
@@ -105,7 +105,7 @@ fn about_plane(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
     pairs().map(|(&i, &value)| value - of_plane(at(i))).collect()
 }
 
-/// Errors of the disparity, px, as errors of the depth, mm: a larger disparity is nearer.
+/// Converts errors of the disparity, px, into errors of the depth, mm; a larger disparity is nearer.
 fn in_depth(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
     let depth = |(k, &px): (usize, &f32)| {
         let slope = -1e3 * field.scale_px_m / field.disparity(k, rays).powi(2);
@@ -114,7 +114,7 @@ fn in_depth(field: &Field, values: &[f32], rays: &Rays) -> Vec<f32> {
     values.iter().enumerate().map(depth).collect()
 }
 
-/// Pixels by the square made one, until the picture is narrow enough.
+/// Averages square patches of pixels so that the picture is narrow enough.
 fn shrunk(image: &[f32], field: &Field) -> (usize, usize, Vec<f32>) {
     let side = field.width.div_ceil(WIDEST).max(1);
     let (width, height) = (field.width / side, field.height / side);

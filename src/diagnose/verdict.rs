@@ -1,4 +1,4 @@
-//! What is said in the end: the verdict, findings in order, the extended model.
+//! Final results: the verdict, the ranked findings, the extended model.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ pub(super) fn not_identifiable(what: &CannotTell) -> Finding {
     }
 }
 
-/// What cannot happen to a camera of this kind is no name for a finding, and no alternative.
+/// Removes names and alternatives that cannot occur on a camera of this kind.
 pub(super) fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>) {
     for f in found {
         f.alternatives.retain(|a| can_happen(a.effect, kind));
@@ -34,8 +34,8 @@ pub(super) fn forget_impossible(found: &mut [Finding], kind: Option<SensorKind>)
     }
 }
 
-/// A name is told once: by the strongest finding of all views, which the model holds, or else by the
-/// strongest of some.
+/// Keeps each name once: for the strongest finding of all views, which the model holds, or else for the
+/// strongest of some views.
 pub(super) fn merge(found: &mut Vec<Finding>) {
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     let of_all: BTreeSet<&str> =
@@ -47,15 +47,16 @@ pub(super) fn merge(found: &mut Vec<Finding>) {
     });
 }
 
-/// Of ten such names on development seeds (501, 777, 902) none was the cause: by Jeffreys's prior.
+/// Probability that a symptom's name is the cause, by Jeffreys's prior: none of ten such names on
+/// development seeds (501, 777, 902) was.
 const NO_SYMPTOM: f64 = 0.045;
-/// What changes how noise is made, and so its size.
+/// Effects that change how noise arises, and so its size.
 const MAKES_NOISE: [&str; 3] = ["spatial-correlation", "frozen-noise", "disparity-quantisation"];
-/// Of the noise's standard deviation, from where on such a change is the first thing to tell.
+/// Share of the noise's standard deviation from which on such a change is reported first.
 const LARGE: f64 = 0.3;
 
-/// A recording held against a simulation of the same physics: the size of the noise follows from
-/// what makes it, and what the catalogue calls a cause is often a symptom.
+/// Downgrades symptoms where a recording is compared with a simulation of the same physics: the size of the
+/// noise follows from its origin, and what the catalogue calls a cause is often a symptom.
 pub(super) fn symptoms(found: &mut [Finding]) {
     let moves = found.iter().any(|f| f.effect == Some("target-motion"));
     let made = moves
@@ -67,7 +68,7 @@ pub(super) fn symptoms(found: &mut [Finding]) {
         for a in f.alternatives.iter_mut().filter(|a| is_symptom(a.effect)) {
             a.probability = a.probability.map(|p| NO_SYMPTOM * p);
         }
-        // What moves past the pattern is matched anew in every frame.
+        // A target that moves past the pattern is matched anew in every frame.
         let renewed = moves && matches!(f.effect, Some("temporal-correlation" | "frame-jitter"));
         if symptom {
             f.physics.push_str(" Held against a simulation it may be a symptom: light, blur and window change it too.");
@@ -87,7 +88,7 @@ fn is_symptom(id: &str) -> bool {
 /// A finding of less than this share of the explained mismatch is minor.
 const MINOR: f64 = 0.01;
 
-/// Nats become shares, and the largest comes first.
+/// Converts nats to shares and sorts the findings, largest first.
 pub(super) fn shares(found: &mut [Finding]) {
     let total: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
     for f in found.iter_mut() {
@@ -100,8 +101,8 @@ pub(super) fn shares(found: &mut [Finding]) {
     });
 }
 
-/// `outcomes` are the mean's and the variance's: where one could not be searched at all, nothing found
-/// says nothing.
+/// `outcomes` are those of the mean and the variance. Where one could not be searched at all, finding
+/// nothing is inconclusive.
 pub(super) fn verdict(found: &[Finding], outcomes: [&Outcome; 2]) -> Verdict {
     match (found.is_empty(), outcomes.iter().all(|o| o.noise.is_tested())) {
         (false, _) => Verdict::Mismatch,
@@ -110,7 +111,7 @@ pub(super) fn verdict(found: &[Finding], outcomes: [&Outcome; 2]) -> Verdict {
     }
 }
 
-/// What could not be tested, in words; the size of the noise in blocks of so many tiles.
+/// Remarks on what could not be tested; the size of the noise is tested in blocks of so many tiles.
 pub(super) fn untested([mean, variance]: [&Outcome; 2], block_tiles: usize) -> Vec<String> {
     let mean = (!mean.noise.is_tested())
         .then(|| "the mean error could not be tested: no view has enough of a target".to_string());
@@ -121,7 +122,7 @@ pub(super) fn untested([mean, variance]: [&Outcome; 2], block_tiles: usize) -> V
     mean.into_iter().chain(variance).collect()
 }
 
-/// Of most views' number of frames: what so few cannot show, in words. A line in time takes two of them.
+/// Remark on what most views have too few frames to show. A line in time takes two of them.
 pub(super) fn few_frames(fields: &[Field]) -> Option<String> {
     let most = |n: usize| 2 * fields.iter().filter(|f| f.frames.len() <= n).count() > fields.len();
     let (has, what) = if most(1) {
@@ -137,7 +138,7 @@ pub(super) fn few_frames(fields: &[Field]) -> Option<String> {
     })
 }
 
-/// Frames that were left out, and why.
+/// Remarks on the frames that were left out, and why.
 pub(super) fn frames_left_out(fields: &[Field]) -> Vec<String> {
     let sum = |of: fn(&Field) -> usize| fields.iter().map(of).sum::<usize>();
     let [repeated, stale, lost] =
@@ -157,7 +158,7 @@ pub(super) fn frames_left_out(fields: &[Field]) -> Vec<String> {
     repeated.into_iter().chain(lost).chain(stale).collect()
 }
 
-/// The model with what was found.
+/// Extends the model with the findings.
 pub(super) fn extend<'a>(
     model: &NoiseModel,
     found: impl Iterator<Item = &'a Finding>,
@@ -168,7 +169,7 @@ pub(super) fn extend<'a>(
     if extended.sensor.is_none() {
         extended.sensor = Some(RecordingFile::of(sensor));
     }
-    // What this diagnosis fitted errs together: its biases, and its variances.
+    // The biases fitted by this diagnosis err together, and so do its variances.
     let fits = model.effects.iter().filter_map(|e| e.covariance.as_ref()).map(|c| c.fit);
     let fit = 1 + fits.max().unwrap_or(0);
     for f in found {
@@ -182,7 +183,7 @@ pub(super) fn extend<'a>(
         };
         let mut parameters = f.parameters.clone();
         if let Some(card) = effects::find(id).filter(|_| f.terms.is_empty()).map(|e| e.card()) {
-            // The simulator takes the catalogue's parameters alone, within their ranges.
+            // The simulator takes only the catalogue's parameters, within their ranges.
             parameters.retain(|name, estimate| {
                 let Some(known) = card.parameters.iter().find(|p| p.name == name) else {
                     return false;
@@ -206,7 +207,7 @@ pub(super) fn extend<'a>(
         let covariance = (!covariance.is_empty()).then(|| covariance.rounded());
         let id = id.into();
         let effect = Effect { id, parameters, shape, learnt_px, covariance, ..Effect::default() };
-        // What has no shape is measured whole: it takes the place of what the model had.
+        // An effect without a shape is measured as a whole and replaces what the model had.
         let same = |e: &&mut Effect| e.id == effect.id && e.shape.is_empty();
         match extended.effects.iter_mut().find(same).filter(|_| effect.shape.is_empty()) {
             Some(had) => *had = effect,
@@ -217,7 +218,7 @@ pub(super) fn extend<'a>(
 }
 
 impl Diagnosis {
-    /// Something was found, and none of it has a part in the score of views kept aside.
+    /// Whether there are findings, but none that counts in the score of the held-out views.
     pub fn has_no_score(&self) -> bool {
         let nothing = self.heldout.as_ref().is_some_and(HeldOut::is_nothing);
         let mut found = self.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
@@ -226,8 +227,8 @@ impl Diagnosis {
 }
 
 impl Finding {
-    /// Has it a part in the score of views kept aside? Losses, a step, an edge, a law of the distance, what has no
-    /// terms and no name, and what some views have alone have none.
+    /// Whether it counts in the score of the held-out views. Losses, steps, edges, laws of the distance,
+    /// findings without terms and name, and those of some views only do not.
     pub fn is_scored(&self) -> bool {
         match self.statistic {
             _ if self.of_some.is_some() => false,

@@ -1,4 +1,4 @@
-//! An effect with its knobs set, from the command line or from a model file.
+//! An effect with its parameters set, from the command line or from a model file.
 
 use std::ops::Deref;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub struct Active {
     pub settings: Settings,
 }
 
-/// What acts: an effect of the catalogue, or the fitted shapes of a model.
+/// An effect of the catalogue, or the fitted shapes of a model.
 #[derive(Clone)]
 pub enum Acting {
     Catalogue(&'static dyn Effect),
@@ -46,20 +46,20 @@ fn fault(what: String) -> Error {
     Error::Argument { what, remedy: KNOWN }
 }
 
-/// The id that was probably meant: it holds the text or is held by it, or a few letters differ.
+/// The id that was probably meant: it contains the text or is contained in it, or a few letters differ.
 fn nearest(text: &str) -> Option<&'static str> {
     let ids = || CATALOGUE.iter().map(|e| e.card().id);
-    // A letter or two stand in any word.
+    // One or two letters occur in any word.
     let part = |id: &&str| text.len() > 2 && (id.contains(text) || text.contains(id));
     let away = |id: &str| levenshtein(text, id);
     ids().find(part).or_else(|| {
-        // A third of the letters wrong is another word.
+        // With more than a third of the letters wrong it is another word.
         ids().min_by_key(|id| away(id)).filter(|id| 3 * away(id) <= id.len())
     })
 }
 
 impl Active {
-    /// By id, all knobs at their typical values.
+    /// The effect of this id, all parameters at their typical values.
     ///
     /// # Errors
     /// When no effect has this id.
@@ -77,10 +77,10 @@ impl Active {
         Ok(Active { effect: Acting::Catalogue(effect), settings: Settings::typical(effect.card()) })
     }
 
-    /// `self` with one knob set.
+    /// `self` with one parameter set.
     ///
     /// # Errors
-    /// When the effect has no such knob, or the value is outside its range.
+    /// When the effect has no such parameter, or the value is outside its range.
     pub fn with(mut self, key: &str, value: f64) -> Result<Self> {
         let card = self.effect.card();
         let index = card.parameters.iter().position(|p| p.name == key).ok_or_else(|| {
@@ -99,10 +99,10 @@ impl Active {
         Ok(self)
     }
 
-    /// `ID`, or `ID:key=value,key=value`.
+    /// Parses `ID`, or `ID:key=value,key=value`.
     ///
     /// # Errors
-    /// When the text is no such thing, or names what the catalogue has not.
+    /// When the text has another form, or names what is not in the catalogue.
     pub fn parse(text: &str) -> Result<Self> {
         let (id, knobs) = text.split_once(':').unwrap_or((text, ""));
         let mut active = Active::typical(id.trim())?;
@@ -119,10 +119,10 @@ impl Active {
         Ok(active)
     }
 
-    /// As `model.json` has it: parameters as numbers or as {"value": number, ..}.
+    /// From an entry of `model.json`: parameters as numbers or as {"value": number, ..}.
     ///
     /// # Errors
-    /// As [`Active::with`]; and when a parameter is no number.
+    /// As [`Active::with`]; and when a parameter is not a number.
     pub fn from_model(entry: &model::Effect) -> Result<Self> {
         let id = &entry.id;
         let mut active = Active::typical(id)?;
@@ -135,11 +135,11 @@ impl Active {
         Ok(active)
     }
 
-    /// Are these effects that the catalogue knows, and have their formulas its parameters, within their
-    /// ranges? What a diagnosis says beside a fitted shape is no setting, and not looked at.
+    /// Checks that the catalogue knows these effects, and that those given by a formula have its
+    /// parameters, within their ranges. Parameters beside a fitted shape are no settings and are ignored.
     ///
     /// # Errors
-    /// When one is not.
+    /// When an effect fails the check.
     pub fn check_model(effects: &[model::Effect]) -> Result<()> {
         effects.iter().try_for_each(|entry| match &entry.shape[..] {
             [] => Active::from_model(entry).map(drop),
@@ -148,7 +148,7 @@ impl Active {
         })
     }
 
-    /// All that a model holds: formulas, and fitted shapes where an effect has one.
+    /// All effects of a model: formulas, and fitted shapes where an effect has one.
     ///
     /// # Errors
     /// As [`Active::from_model`], for effects without a shape.
@@ -163,7 +163,7 @@ impl Active {
         Ok(all)
     }
 
-    /// For a recipe: the formula's parameters, or the terms of the shape.
+    /// JSON for a recipe: the formula's parameters, or the terms of the shape.
     pub fn described(&self) -> Value {
         let id = self.effect.card().id;
         match self.effect.terms() {
@@ -172,13 +172,13 @@ impl Active {
         }
     }
 
-    /// Is the strength such that nature is as without the effect?
+    /// Whether the strength is the one at which the effect does nothing.
     pub fn is_identity(&self) -> bool {
-        // A shape has no knobs.
+        // A shape has no parameters.
         self.settings.0.first().is_some_and(|strength| *strength == self.effect.card().identity)
     }
 
-    /// Let it act on a frame under way.
+    /// Applies it to an exposure, unless it is at its identity.
     pub fn act(&self, exposure: &mut Exposure, seed: Seed) {
         if !self.is_identity() {
             let draw = Draw { seed, id: self.effect.card().id, instant: exposure.instant };
@@ -186,10 +186,10 @@ impl Active {
         }
     }
 
-    /// Two of a kind would share their random numbers, and so would not be independent.
+    /// Refuses duplicates: they would share their random numbers, and so would not be independent.
     ///
     /// # Errors
-    /// When an effect is there twice.
+    /// When an effect occurs twice.
     pub fn refuse_twice(effects: &[Active]) -> Result<()> {
         let ids: Vec<&str> = effects.iter().map(|a| a.effect.card().id).collect();
         match ids.iter().enumerate().find(|(n, id)| ids[..*n].contains(id)) {
@@ -201,8 +201,8 @@ impl Active {
         }
     }
 
-    /// In the order in which light meets them, whatever the order they were named in: by stage,
-    /// within a stage as in the catalogue.
+    /// The effects in light-path order, whatever the order given: by stage, within a stage as in the
+    /// catalogue.
     pub fn in_light_path(effects: &[Active]) -> Vec<&Active> {
         let place = |a: &&Active| {
             let card = a.effect.card();
@@ -213,7 +213,7 @@ impl Active {
         ordered
     }
 
-    /// As [`Active::parse`] reads it, every parameter given, to four digits.
+    /// Text for [`Active::parse`], with every parameter to four digits.
     pub fn argument(&self) -> String {
         let card = self.effect.card();
         let knobs = card.parameters.iter().zip(&self.settings.0);
@@ -236,10 +236,12 @@ impl std::fmt::Debug for Active {
 }
 
 impl NoiseModel {
-    /// From a `model.json`, or the folder that holds one.
-    /// An error when the file is missing, not a model, damaged, or of a newer format; and when an effect
-    /// without a fitted shape is not in the catalogue, has a parameter that the catalogue's has not, or one
-    /// outside its range: nothing that reads the model would do what it says.
+    /// Reads a `model.json`, or the folder that holds one.
+    ///
+    /// # Errors
+    /// When the file is missing, not a model, damaged, or of a newer format; and when an effect without a
+    /// fitted shape is not in the catalogue, or has a parameter that is unknown or out of range: nothing
+    /// that reads the model would do what it says.
     pub fn read(path: &Path) -> Result<Self> {
         let file = Self::file(path);
         let model = Self::read_unchecked(&file)?;

@@ -1,4 +1,4 @@
-//! Sunlight lifts the background and the noise.
+//! Ambient light raises the background and the noise.
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
@@ -30,18 +30,18 @@ impl Effect for AmbientLight {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let ratio = settings.at(0) * exposure.ambient_lux / ROOM_LUX;
         for i in 0..exposure.pixels() {
-            // Neither depends on the print; the pattern alone on distance and angle.
+            // The ratio does not depend on the print; the pattern alone falls off with distance and angle.
             let facing = exposure.seen.cos_incidence(i, exposure.rays);
             let excess = ratio * exposure.point(i).norm_squared() / facing;
             if excess.is_finite() {
-                // Shot noise of pattern and room together against that of the pattern.
+                // Shot noise of pattern and room together, relative to that of the pattern.
                 exposure.sigma[i] *= (1.0 + excess).sqrt() as f32;
                 exposure.light[i] *= (1.0 + excess) as f32;
             }
         }
     }
 
-    /// Only where somebody measured the light of the room.
+    /// Only where the ambient light was measured.
     fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
         let ratios = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0].into_iter();
         let lit = ratios.filter(|_| bounds.reach.ambient[1] > 0.0);
@@ -62,8 +62,8 @@ impl Effect for AmbientLight {
         if excess <= 0.0 {
             return vec![fit.estimate("ratio", &|b| ratio * b[0])];
         }
-        // The ratio that makes the noise what it is far away: shapes of other ratios, more or less of
-        // them, agree there and not at a distance of none.
+        // Ratio that reproduces the noise at the far end: scaled shapes of other ratios agree there, but
+        // not at zero distance.
         let far = PixelContext { z, ambient, ..PixelContext::default() };
         vec![fit.estimate("ratio", &|b| fit.value(b, far).exp_m1() / excess)]
     }
@@ -73,7 +73,7 @@ impl Effect for AmbientLight {
     }
 }
 
-/// Light of the room against the pattern's.
+/// Ambient light relative to the pattern's.
 fn room(ratio: f64) -> Basis {
     Basis::Log1p { over: Coordinate::Ambient(ratio) }
 }

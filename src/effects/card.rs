@@ -1,4 +1,4 @@
-//! What is known about an effect before it acts.
+//! The card of an effect: its fixed properties and its parameters.
 
 use serde::Serialize;
 
@@ -13,24 +13,24 @@ pub enum Stage {
     Optics,
     /// How noisy a pixel is, and the light that makes it so: changes `sigma` and `light`.
     Variance,
-    /// How the noise hangs together over frames: changes `noise`, of unit variance.
+    /// Correlation of the noise over frames: changes `noise`, of unit variance.
     NoiseInTime,
-    /// The part of the noise that stands still: changes `noise`, of unit variance.
+    /// The static part of the noise: changes `noise`, of unit variance.
     NoiseAtRest,
-    /// How neighbours share their noise: changes `noise`, of unit variance.
+    /// Correlation of the noise between neighbours: changes `noise`, of unit variance.
     NoiseInSpace,
-    /// How far single pixels stray: changes `noise`.
+    /// Tails of the noise distribution: changes `noise`.
     NoiseTails,
     /// Errors of the match: changes `disparity`, px.
     Disparity,
-    /// Pixels without an answer: `disparity` becomes NaN.
+    /// Pixels without a match: `disparity` becomes NaN.
     #[serde(rename = "Missing")]
     Dropout,
     /// The read-out of the match: rounds and shifts `disparity`.
     Quantiser,
-    /// What the driver makes of it: changes `depth`.
+    /// Conversion by the driver: changes `depth`.
     Driver,
-    /// The stored number: rounds `depth`.
+    /// The stored value: rounds `depth`.
     Word,
 }
 
@@ -51,15 +51,15 @@ impl Stage {
     ];
 }
 
-/// A knob.
+/// A parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
     /// As given on the command line; it ends with the unit.
     pub name: &'static str,
     pub unit: &'static str,
-    /// What is accepted.
+    /// Accepted values.
     pub range: [f64; 2],
-    /// A typical size; used where the user names none.
+    /// Typical value, used where the user gives none.
     pub typical: f64,
     pub summary: &'static str,
 }
@@ -85,36 +85,36 @@ impl Settings {
     }
 }
 
-/// The face of an effect for people and for the command line.
+/// Description of an effect, for people and the command line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Card {
     pub id: &'static str,
-    /// What it is called in the middle of a sentence.
+    /// Name within a sentence.
     pub title: &'static str,
     pub stage: Stage,
     /// What it does, one sentence.
     pub summary: &'static str,
     /// The first is the strength.
     pub parameters: &'static [Parameter],
-    /// The cameras that it can happen to.
+    /// Kinds of camera that it can affect.
     pub kinds: &'static [SensorKind],
-    /// The strength at which nature is as if the effect were not there.
+    /// Strength at which the effect does nothing.
     pub identity: f64,
     pub statistic: &'static str,
     pub axis: &'static str,
-    /// The effects it is taken for most easily, by id, and what distinguishes them.
+    /// The effects most easily confused with it, by id, and what distinguishes them.
     pub confused_with: &'static str,
     pub reference: &'static str,
-    /// May it be a symptom of another cause where a recording is held against a simulation? Light,
+    /// Whether it may be a symptom of another cause when a recording is compared with a simulation: light,
     /// blur and window of a matcher change it.
     pub is_symptom: bool,
-    /// With another formula of the same physics its parameters come out different by this share
-    /// (measured on ray-traced recordings).
+    /// Relative error of its parameters when a sensor follows another formula of the same physics (measured
+    /// on ray-traced recordings).
     pub formula_error: f64,
 }
 
 impl Card {
-    /// What most effects have in common; the rest is each card's own.
+    /// Defaults shared by most effects.
     pub const BASE: Card = Card {
         id: "",
         title: "",
@@ -131,7 +131,7 @@ impl Card {
         formula_error: 0.0,
     };
 
-    /// Can it happen to a camera of this kind? To one that is not known all can.
+    /// Whether it can affect a camera of this kind; true where the kind is not known.
     pub fn applies_to(&self, kind: Option<SensorKind>) -> bool {
         kind.is_none_or(|kind| self.kinds.contains(&kind))
     }

@@ -56,7 +56,8 @@ impl Effect for ColumnBanding {
         if settings.at(2) > 1.0 {
             let share: f64 = draw.stream(Scope::View, "period").random();
             let period = period * settings.at(2).powf(share - 0.5);
-            // With a step in the middle the bands begin half a period on. As seen, the disparity falls.
+            // With a step in the middle the bands begin half a period later. The disparity falls at a step,
+            // as observed.
             let middle = 0.5 * (width as f64 + period);
             exposure.shift_disparity(|i| tooth(i % width, middle, -amplitude, period));
             return;
@@ -66,10 +67,10 @@ impl Effect for ColumnBanding {
 
     fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
         let mut all = Vec::new();
-        // Bands that do not come again are none: three periods at least.
+        // Bands repeat: at least three periods.
         for half_cycles in 6..=64 {
             let period_px = 2.0 * bounds.camera.width as f64 / f64::from(half_cycles);
-            // Waves shorter than two patches look like long ones.
+            // Waves shorter than two patches alias to long ones.
             let resolved = (period_px / (2.0 * bounds.patch_px)) as usize;
             if resolved > 0 {
                 all.push(stripes(period_px, resolved.min(4)));
@@ -81,7 +82,8 @@ impl Effect for ColumnBanding {
         all
     }
 
-    /// Bands on a real sensor ride on a smooth error of the column that is no band's.
+    /// On a real sensor the bands are superimposed on a smooth error of the column that is not part of
+    /// them.
     fn must_explain(&self) -> Option<f64> {
         Some(0.45)
     }
@@ -94,7 +96,7 @@ impl Effect for ColumnBanding {
         let height = |b: &[f64]| greatest(|t| fit.value(b, at(t)));
         let amplitude =
             fit.estimate("amplitude_px", &|b| height(b) / greatest(|t| blunt_tooth(t, harmonics)));
-        // What turns the first by an angle turns the k-th by k times that.
+        // A shift that turns the phase of the first harmonic by an angle turns the k-th by k times that.
         let sure = |k: usize| {
             let size = fit.estimate("", &|b| b[2 * k].hypot(b[2 * k + 1]));
             ((k + 1) as f64 * size.value / size.std_error).powi(2)
@@ -132,24 +134,25 @@ impl Effect for ColumnBanding {
     }
 }
 
-/// What rounding to the nearest whole step leaves in a column, from -1 to 1 times the amplitude.
+/// Remainder of rounding to the nearest whole step in a column, from -1 to 1 times the amplitude.
 fn tooth(column: usize, centre: f64, amplitude: f64, period: f64) -> f64 {
     let bands = (column as f64 - centre) / period;
     2.0 * amplitude * (bands.round() - bands)
 }
 
-/// The first orders of a tooth of amplitude 1, so many periods on.
+/// The first harmonics of a tooth of amplitude 1, at a phase in periods.
 fn blunt_tooth(periods: f64, orders: usize) -> f64 {
     let order = |k: f64| (TAU * k * periods).sin() / k;
     FRAC_2_PI * (1..=orders).map(|k| order(k as f64)).sum::<f64>()
 }
 
-/// Teeth whose higher orders are finer than a patch turn the first by 0.02 to 0.03 cycles over the picture
-/// (five ray-traced sensors), as this share of it would by chance.
+/// Relative error of the amplitude that unresolved harmonics are equivalent to: those finer than a patch
+/// turn the phase of the first by 0.02 to 0.03 cycles over the picture (five ray-traced sensors).
 const UNRESOLVED: f64 = 0.05;
 
-/// Cramer-Rao bound of the period of a sine whose amplitude is known to this share, seen evenly over the
-/// `columns`, px: what a change of the period turns it by is as sure as its phase (Rife and Boorstyn, 1974).
+/// Cramer-Rao bound on the period, px, of a sine whose amplitude is known to this share, sampled evenly
+/// over the `columns`, px: a change of the period is known as well as the phase shift it causes (Rife and
+/// Boorstyn, 1974).
 fn error_of_period(period_px: f64, share: f64, columns: [f64; 2]) -> f64 {
     let length = (columns[1] - columns[0]).max(period_px);
     period_px.powi(2) * share.hypot(UNRESOLVED) / TAU * 12f64.sqrt() / length

@@ -1,4 +1,4 @@
-//! The matcher answers in steps.
+//! The matcher returns disparity in steps.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
 use crate::sensors::SensorKind;

@@ -1,4 +1,4 @@
-//! Where effects get their random numbers.
+//! Random numbers of the effects.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -6,18 +6,18 @@ use rand_distr::{Distribution, StandardNormal};
 use super::Instant;
 use crate::rng::{Seed, Stream};
 
-/// For how long a random number stays.
+/// How long a random number stays the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// The unit's own: the same in every view.
+    /// Fixed for the unit: the same in every view.
     Sensor,
-    /// Stands still while the scene does.
+    /// Static while the scene is: the same in every frame of a view.
     View,
     /// Fresh in every frame.
     Frame,
 }
 
-/// Where an effect's random numbers come from: streams named after the effect alone.
+/// Source of an effect's random numbers: streams named after the effect alone.
 #[derive(Debug, Clone, Copy)]
 pub struct Draw<'a> {
     pub seed: Seed,
@@ -38,7 +38,7 @@ impl Draw<'_> {
     }
 }
 
-/// Independent standard normal numbers.
+/// Fills `out` with independent standard normal numbers.
 pub fn fill_normal(out: &mut [f32], rng: &mut Stream) {
     out.fill_with(|| StandardNormal.sample(rng));
 }
@@ -50,13 +50,13 @@ pub fn normals(count: usize, mut rng: Stream) -> Vec<f32> {
     numbers
 }
 
-/// True with `probability`; takes one number whatever the probability, so that the stream stays
-/// in step with the pixels.
+/// True with `probability`; draws one number whatever the probability, so that the stream stays in step
+/// with the pixels.
 pub fn chance(probability: f64, rng: &mut Stream) -> bool {
     rng.random::<f64>() < probability
 }
 
-/// 1 / (1 + exp(-beyond / width)), a step where the width is zero. NaN stays away: 0.
+/// 1 / (1 + exp(-beyond / width)), a step where the width is zero; 0 for NaN.
 pub fn logistic(beyond: f64, width: f64) -> f64 {
     if width == 0.0 {
         return f64::from(u8::from(beyond > 0.0));

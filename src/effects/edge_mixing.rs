@@ -1,4 +1,4 @@
-//! Depth mixes with what is behind.
+//! Depth mixes with the background at edges.
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Stage};
 use crate::terms::{Basis, Coordinate};
@@ -50,8 +50,8 @@ impl Effect for EdgeMixing {
     }
 }
 
-/// By how much each pixel's depth is off, m: of the nearest other surface half at the edge, and
-/// linearly less to nothing at `width` px, as the share of a square footprint.
+/// Error of each pixel's depth, m: at the edge half the step to the nearest other surface, falling linearly
+/// to zero at `width` px, as the share of a square footprint.
 fn offsets(exposure: &Exposure, width: f64) -> Vec<f32> {
     let mut nearest = vec![width; exposure.pixels()];
     let mut offsets = vec![0f32; exposure.pixels()];
@@ -69,7 +69,7 @@ fn offsets(exposure: &Exposure, width: f64) -> Vec<f32> {
     offsets
 }
 
-/// Do two pixels answer from different surfaces?
+/// Whether two pixels have depth from different surfaces.
 fn other(exposure: &Exposure, a: usize, b: usize) -> bool {
     let there = |i: usize| exposure.depth[i].is_finite();
     exposure.seen.surface[a] != exposure.seen.surface[b] && there(a) && there(b)
@@ -79,7 +79,7 @@ fn at_border(exposure: &Exposure, i: usize) -> bool {
     around(exposure, i, 1).any(|j| other(exposure, i, j))
 }
 
-/// Pixels at most `reach` columns and rows away, itself among them.
+/// Pixels at most `reach` columns and rows away, including `i` itself.
 fn around(exposure: &Exposure, i: usize, reach: usize) -> impl Iterator<Item = usize> + use<> {
     let (width, height) = (exposure.seen.width, exposure.seen.height);
     let (u, v) = (i % width, i / width);
@@ -87,8 +87,8 @@ fn around(exposure: &Exposure, i: usize, reach: usize) -> impl Iterator<Item = u
     span(v, height).flat_map(move |v| span(u, width).map(move |u| v * width + u))
 }
 
-/// Distance of pixel `i` from the edge this side of pixel `border`, px: the edge runs half-way
-/// between the two surfaces' pixels.
+/// Distance of pixel `i` from the edge next to pixel `border`, px: the edge runs half-way between the two
+/// surfaces' pixels.
 fn from_edge(exposure: &Exposure, border: usize, i: usize) -> f64 {
     let ((ub, vb), (u, v)) = (exposure.at(border), exposure.at(i));
     f64::hypot(u.abs_diff(ub) as f64, v.abs_diff(vb) as f64) - 0.5

@@ -1,4 +1,4 @@
-//! One frame under way from the surface to the stored raw value.
+//! One frame on its way from the surface to the stored raw value.
 
 use std::collections::HashMap;
 
@@ -22,20 +22,20 @@ pub struct Instant {
     pub view_s: f64,
 }
 
-/// A frame on its way. Arrays are per pixel, row-major; NaN means nothing there.
+/// A frame in progress. Arrays are per pixel, row-major; NaN means no value.
 pub struct Exposure<'a> {
     pub sensor: &'a Sensor,
     pub rays: &'a Rays,
     /// What the pixels look at, undisturbed.
     pub seen: &'a Seen,
     pub instant: Instant,
-    /// Light of the room on the target, lx.
+    /// Ambient light on the target, lx.
     pub ambient_lux: f64,
-    /// Degrees Celsius, where somebody measured it.
+    /// Degrees Celsius, where measured.
     pub temperature_c: Option<f64>,
     /// Depth along the optical axis, m: true until the noise is added, then measured.
     pub depth: Vec<f32>,
-    /// Infrared light that comes back, relative to a white surface at 1 m facing the sensor.
+    /// Returned infrared light, relative to a white surface at 1 m facing the sensor.
     pub light: Vec<f32>,
     /// Standard deviation of the depth, m.
     pub sigma: Vec<f32>,
@@ -43,10 +43,9 @@ pub struct Exposure<'a> {
     pub noise: Vec<f32>,
     /// fx * baseline / z, px; between [`super::Stage::Disparity`] and the read-out.
     pub disparity: Vec<f32>,
-    /// What an effect keeps from frame to frame of a view, by its id; frames come in order.
+    /// State that an effect keeps from frame to frame of a view, by its id; frames come in order.
     pub memory: HashMap<&'static str, Vec<f32>>,
-    /// What an effect has worked out from `seen` alone, by its id; gone when something else is
-    /// seen.
+    /// Values that an effect derived from `seen` alone, by its id; dropped when something else is seen.
     pub still: HashMap<&'static str, Vec<f32>>,
 }
 
@@ -84,19 +83,19 @@ impl Exposure<'_> {
     pub fn meet(&self, i: usize, ray: (f64, f64), lift_m: f64) -> f64 {
         let [a, b, c] = self.seen.normal[i].map(f64::from);
         let along = |(x, y): (f64, f64)| a * x + b * y + c;
-        // n . X of the surface is negative: the normal looks back.
+        // n . X is negative on the surface: the normal points back at the camera.
         let level = f64::from(self.depth[i]) * along(self.rays.at(i));
         (level + lift_m) / along(ray)
     }
 
-    /// Change every pixel's disparity, px, by what `shift` says.
+    /// Adds `shift(i)`, px, to the disparity of every pixel `i`.
     pub fn shift_disparity(&mut self, shift: impl Fn(usize) -> f64) {
         for (i, d) in self.disparity.iter_mut().enumerate() {
             *d += shift(i) as f32;
         }
     }
 
-    /// `act` with what `make` made in the view's first frame.
+    /// Calls `act` with what `make` returned in the view's first frame.
     pub fn with_kept(
         &mut self,
         id: &'static str,

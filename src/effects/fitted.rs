@@ -1,4 +1,4 @@
-//! From the coefficients of a fitted shape to the parameters that people know an effect by.
+//! Converts the coefficients of a fitted shape to the usual parameters of an effect.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,30 +10,31 @@ pub struct Estimate {
     pub parameter: &'static str,
     pub value: f64,
     pub std_error: f64,
-    /// Was the shape settled by it? It is then no coefficient of a formula that may be off.
+    /// Whether the parameter selects the shape; it is then no coefficient of a formula that may be off.
     pub settles: bool,
 }
 
 impl Estimate {
-    /// What settles the shape, and was tried in steps.
+    /// A parameter that selects the shape and was tried in steps.
     pub fn given(parameter: &'static str, value: f64, std_error: f64) -> Self {
         Estimate { parameter, value, std_error, settles: true }
     }
 
-    /// With its error enlarged by the share that the cause's formula is off: no sensor has that very one.
+    /// The estimate with its standard error enlarged by the relative error of the formula: no sensor
+    /// follows that very one.
     pub fn of_any_formula(self, share: f64) -> Self {
         let off = if self.settles { 0.0 } else { share * self.value };
         Estimate { std_error: self.std_error.hypot(off), ..self }
     }
 }
 
-/// A shape with its coefficients, as a fit found them.
+/// A fitted shape with its coefficients.
 #[derive(Debug, Clone, Copy)]
 pub struct Fitted<'a> {
     pub shape: &'a Basis,
     pub coefficients: &'a [f64],
     pub covariance: &'a DMatrix<f64>,
-    /// Of the recording.
+    /// Extent of the recording.
     pub reach: &'a Extent,
 }
 
@@ -49,7 +50,8 @@ impl Fitted<'_> {
     }
 
     /// Coefficients and covariance of the same fit with coefficient `k` held at zero, which is what a shape
-    /// without its column would have had: the Gaussian posterior's condition.
+    /// without its column would have given: the Gaussian posterior, conditioned. `None` where its variance
+    /// is not known.
     pub fn without(&self, k: usize) -> Option<(Vec<f64>, DMatrix<f64>)> {
         let variance = self.covariance.get((k, k)).copied().filter(|v| *v > 0.0)?;
         let column = self.covariance.column(k);
@@ -58,7 +60,7 @@ impl Fitted<'_> {
         Some((coefficients, self.covariance - column * column.transpose() / variance))
     }
 
-    /// Of the shape at a place, with these coefficients.
+    /// Value of the shape at a place, with these coefficients.
     pub fn value(&self, coefficients: &[f64], place: PixelContext) -> f64 {
         self.shape.value(coefficients, &place)
     }
@@ -83,7 +85,7 @@ impl Fitted<'_> {
     }
 }
 
-/// The k of k r^2 + constant that comes nearest to a curve over 0 to `far`.
+/// Slope k of the least-squares fit of k r^2 + constant to a curve over 0 to `far`, weighted by area.
 pub fn slope_in_square(curve: impl Fn(f64) -> f64, far: f64) -> f64 {
     const NODES: usize = 41;
     let nodes = || (0..NODES).map(|n| far * n as f64 / (NODES - 1) as f64);
@@ -95,7 +97,7 @@ pub fn slope_in_square(curve: impl Fn(f64) -> f64, far: f64) -> f64 {
     cross / mean(&|r| (r * r - square).powi(2))
 }
 
-/// Half of the way from the least to the greatest over a period.
+/// Half the peak-to-peak range of a curve over a period.
 pub fn greatest(curve: impl Fn(f64) -> f64) -> f64 {
     let [low, high] = crate::stats::range((0..64).map(|k| curve(f64::from(k) / 64.0)));
     0.5 * (high - low)
@@ -105,7 +107,7 @@ pub fn greatest(curve: impl Fn(f64) -> f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Least squares on three columns, held to two, is least squares on those two.
+    /// Least squares on three columns, one of them held at zero, is least squares on the other two.
     #[test]
     fn a_fit_without_a_column_is_that_of_the_others() {
         let columns = DMatrix::from_fn(40, 3, |i, j| (0.1 * i as f64 - 1.0).powi(j as i32));

@@ -1,4 +1,4 @@
-//! Laser speckle stands still.
+//! Laser speckle is static.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage, Scope, normals};
 

@@ -36,14 +36,14 @@ impl Effect for IntensityDependentNoise {
         }
     }
 
-    /// A target of one grey says nothing.
+    /// None for a target of one grey.
     fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
         let kinds = [(1, false), (1, true), (2, true)].into_iter();
         let seen = kinds.filter(|_| bounds.reach.is_unevenly_lit());
         seen.map(|(orders, level)| dark(orders, level)).collect()
     }
 
-    /// The law's exponent is that of the law without a bend, where the shape has one.
+    /// Exponent of the power law; where the shape has a bend, of the fit without it.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let plain = fit.without(BEND);
         let fit = plain.as_ref().map_or(*fit, |(coefficients, covariance)| Fitted {
@@ -59,12 +59,12 @@ impl Effect for IntensityDependentNoise {
     }
 }
 
-/// Number of the coefficient that bends the law, after its slope and the level.
+/// Index of the coefficient that bends the law, after its slope and the level.
 const BEND: usize = 2;
-/// Black velvet still gives back this much.
+/// Least reflectance: that of black velvet.
 const DARKEST: f64 = 0.01;
 
-/// Of the logarithm of the light, with a level: what counts as light is arbitrary.
+/// Polynomial in log light, optionally with a level: what counts as light is arbitrary.
 fn dark(orders: usize, level: bool) -> Basis {
     Basis::Powers { over: Coordinate::LogLight, orders, level, times: Modulation::One }
 }

@@ -1,4 +1,4 @@
-//! The ray of a pixel is not where the pinhole says.
+//! A pixel's ray is not the pinhole's.
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
@@ -40,7 +40,7 @@ impl Effect for LensDistortion {
         let mut all: Vec<Basis> =
             [1, 2, 4].map(|orders| bent(bounds.camera, orders)).into();
         if bounds.kind.is_none_or(|k| k == SensorKind::StructuredLight) {
-            // The reference was recorded where the sensor works.
+            // The reference was recorded within the sensor's working range.
             let [low, high] = bounds.reach.disparity;
             for reference_px in [low, (low * high).sqrt(), high] {
                 all.extend([1, 2, 4].map(|orders| matched(bounds.camera, reference_px, orders)));
@@ -49,14 +49,14 @@ impl Effect for LensDistortion {
         all
     }
 
-    /// What is left of k1 in a depth picture that was calibrated (Khoshelham and Elberink 2012,
-    /// table 1: 0.003; Smisek, Jancosek and Pajdla 2011: 0.01 to 0.05).
+    /// Residual k1 of a calibrated depth picture (Khoshelham and Elberink 2012, table 1: 0.003; Smisek,
+    /// Jancosek and Pajdla 2011: 0.01 to 0.05).
     fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
         0.02
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
-        // c1 r^2 + c2 r^4 .. of the ray, as k1 r^2.
+        // c1 r^2 + c2 r^4 + .. of the ray, expressed as k1 r^2.
         let radial =
             |b: &[f64], r: f64| b.iter().rev().fold(0.0, |sum, c| (sum + c) * r * r);
         vec![fit.estimate("k1", &|b| slope_in_square(|r| radial(b, r), 0.6))]
@@ -72,7 +72,7 @@ impl Effect for LensDistortion {
     }
 }
 
-/// The ray that a lens with `k1` brings to (x, y): fixed-point iteration.
+/// The ray that a lens with `k1` images at (x, y), by fixed-point iteration.
 fn undistorted((xd, yd): (f64, f64), k1: f64) -> (f64, f64) {
     let (mut x, mut y) = (xd, yd);
     for _ in 0..ITERATIONS {
@@ -82,12 +82,12 @@ fn undistorted((xd, yd): (f64, f64), k1: f64) -> (f64, f64) {
     (x, y)
 }
 
-/// At a Kinect's corner (0.69) with |k1| = 0.2 each round shrinks the error to a half or less: what
-/// is left is below 1e-4 px.
+/// At a Kinect's corner (0.69) with |k1| = 0.2 each iteration at least halves the error: the remainder is
+/// below 1e-4 px.
 const ITERATIONS: usize = 20;
 
-/// The same where a matcher looks through the lens: it finds the shift between two spots that are both
-/// displaced, and the larger the shift the more it is stretched.
+/// Like [`bent`], where a matcher looks through the lens: it finds the shift between two spots that are
+/// both displaced, and a larger shift is stretched more.
 fn matched(camera: &Camera, reference_px: f64, orders: usize) -> Basis {
     Basis::Lens { fx: camera.fx, fy: camera.fy, reference_px, orders }
 }

@@ -1,10 +1,10 @@
-//! What physics does to a depth image, one cause a file.
+//! Physical effects on a depth image, one cause per file.
 //!
-//! Light meets the surface, passes the lens, is matched into a disparity and becomes a raw depth value.
-//! Each effect belongs to one [`Stage`] of that path; the driver in `simulate` walks the stages in
-//! order and hands every active effect the [`Exposure`] under way. An effect at its card's identity
-//! is not there, and every effect draws only from streams of its own name, so that adding one
-//! changes no other.
+//! Light hits the surface, passes the lens, is matched into a disparity and becomes a raw depth value. Each
+//! effect belongs to one [`Stage`] of that path; the driver in `simulate` walks the stages in order and
+//! passes the [`Exposure`] in progress to every active effect. An effect at its card's identity does
+//! nothing, and every effect draws only from random streams of its own name, so that adding one changes no
+//! other.
 
 mod active;
 mod card;
@@ -29,79 +29,78 @@ use crate::terms::{Basis, Statistic, Term};
 use draw::{chance, normals};
 use fitted::{greatest, slope_in_square};
 
-/// What has a card; `catalogue!` gives each effect the `CARD` of its file.
+/// Anything with a card; `catalogue!` gives each effect the `CARD` of its file.
 pub trait Carded {
     fn card(&self) -> &'static Card;
 }
 
-/// A physical effect with both its faces: what nature does to an exposure, and what a recording
-/// shows of it. Effects without [`Effect::shapes`] show in textures, losses, edges or reference
-/// distances, and are recognised by measurements of their own.
+/// A physical effect: what it does to an exposure, and how it shows in a recording. Effects without
+/// [`Effect::shapes`] show in textures, losses, edges or reference distances, and are recognised by
+/// dedicated measurements.
 pub trait Effect: Carded + Send + Sync {
-    /// Change `exposure` as the effect does with these settings. Called once a frame, at the
-    /// card's stage, and only when the strength is not the card's identity.
+    /// Applies the effect to `exposure`. Called once per frame, at the card's stage, and only when the
+    /// strength is not the card's identity.
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw);
 
-    /// The fitted terms that stand in place of a formula; the catalogue's effects have none.
+    /// Fitted terms that replace a formula; none for the catalogue's effects.
     fn terms(&self) -> &[Term] {
         &[]
     }
 
-    /// What it may look like: of the mean, in px of disparity, or of the logarithm of the variance,
-    /// as the card's statistic has it. A diagnosis tries them all.
+    /// Candidate basis functions: of the mean, px of disparity, or of the log variance, depending on the
+    /// card's statistic. A diagnosis tries them all.
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
         Vec::new()
     }
 
-    /// A size that coefficient number `k` of one of its shapes may well have, in its unit: the standard
-    /// deviation of what is believed before anything was measured. `flat` is what is stated of the
-    /// target.
+    /// Prior standard deviation of coefficient number `k` of one of its shapes, in its unit. `flat` is what
+    /// is stated about the target.
     fn usual(&self, _shape: &Basis, _k: usize, _flat: Option<&Flat>) -> f64 {
         USUAL_PX
     }
 
-    /// Can a shape with these coefficients be meant, with what is stated of the target?
+    /// Whether a shape with these coefficients can be this effect, given what is stated about the target.
     fn agrees_with(&self, _flat: Option<&Flat>, _shape: &Basis, _coefficients: &[f64]) -> bool {
         true
     }
 
-    /// The share of what the best nameless curve explains that its name must, where less than of
-    /// others will do.
+    /// Least share of the best unnamed curve's gain that this effect must reach, where that is lower than
+    /// for other effects.
     fn must_explain(&self) -> Option<f64> {
         None
     }
 
-    /// Was the axis that it follows measured for its own sake? Between equals it is then meant.
+    /// Whether the axis that it follows was measured independently; it then wins ties.
     fn rests_on_a_measurement(&self) -> bool {
         false
     }
 
-    /// The parameters of a fitted shape.
+    /// Parameters of a fitted shape.
     fn estimates(&self, _: &Fitted) -> Vec<Estimate> {
         Vec::new()
     }
 
-    /// What known parameters make of a measurement, where that is a term.
+    /// The term for known parameters, if the effect is one.
     fn term(&self, _: Known, _: &Camera) -> Option<Term> {
         None
     }
 
-    /// What takes it out of a depth image; nothing for what is no bias of the sensor.
+    /// What removes the effect from a depth image; `None` for what is no bias of the sensor.
     fn inverse(&self, settings: &Settings, camera: &Camera) -> Option<Inverse> {
         let term = self.term(&|name| settings.named(self.card(), name), camera)?;
         term.is_sensor_bias().then_some(Inverse::Term(term))
     }
 
-    /// How the smallest of it that could have been found is told.
+    /// How to report the smallest detectable size of the effect.
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {
         None
     }
 }
 
-/// Errors of a matcher beyond a pixel are gross ones.
+/// Default prior standard deviation, px: larger errors of a matcher are gross ones.
 pub const USUAL_PX: f64 = 1.0;
 
-/// The catalogue: an effect takes one file and one word in this list (`crate::docs::catalogue`).
+/// The catalogue: an effect takes one file and one line in this list (`crate::docs::catalogue`).
 macro_rules! catalogue {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(mod $module;)*
@@ -112,7 +111,7 @@ macro_rules! catalogue {
             }
         })*
 
-        /// Every effect, in the order of the light's path and of `crate::docs::catalogue`.
+        /// Every effect, in the order of `crate::docs::catalogue`.
         pub static CATALOGUE: &[&dyn Effect] = &[$(&$module::$name),*];
     };
 }
@@ -149,13 +148,13 @@ catalogue! {
     occlusion_shadow::OcclusionShadow,
 }
 
-/// The effect of this id.
+/// Finds the effect of this id.
 pub fn find(id: &str) -> Option<&'static dyn Effect> {
     CATALOGUE.iter().copied().find(|e| e.card().id == id)
 }
 
-/// The order in which a diagnosis tries the axes of the cards: it decides ties, and which random
-/// numbers the null of each candidate draws.
+/// Order in which a diagnosis tries the cards' axes: it decides ties, and which random numbers the null
+/// distribution of each candidate draws.
 const TRIED: [&str; 9] = [
     "z",
     "radius",
@@ -168,7 +167,7 @@ const TRIED: [&str; 9] = [
     "intensity",
 ];
 
-/// The effects that change this statistic, in the order in which they are looked for.
+/// The effects that change this statistic, in the order in which they are tried.
 pub fn that_change(statistic: Statistic) -> Vec<&'static dyn Effect> {
     let mut all: Vec<&dyn Effect> =
         CATALOGUE.iter().copied().filter(|e| e.card().statistic == statistic.id()).collect();

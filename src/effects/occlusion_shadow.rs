@@ -1,4 +1,4 @@
-//! The projector cannot see what the camera sees.
+//! The projector does not reach all that the camera sees.
 
 use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
 use crate::sensors::SensorKind;
@@ -38,10 +38,10 @@ impl Effect for OcclusionShadow {
     }
 }
 
-/// One where the light of the projector does not reach.
+/// One where the projector's light does not reach.
 ///
-/// The projector stands on the side of growing columns (a Kinect v1 seen from behind): its column
-/// for a point is u - d with the disparity d = fx b / z, so that the shadow falls on the other side.
+/// The projector is on the side of increasing columns (a Kinect v1 seen from behind): its column for a
+/// point is u - d with the disparity d = fx b / z, so the shadow falls on the other side.
 fn shadow(exposure: &Exposure, share: f32) -> Vec<f32> {
     let seen = exposure.seen;
     let scale = share * exposure.disparity_px_m() as f32;
@@ -58,15 +58,16 @@ fn shadow(exposure: &Exposure, share: f32) -> Vec<f32> {
     dark
 }
 
-/// Nearest surface by the projector's columns: its disparity, px.
+/// Disparity of the nearest surface by projector column, px.
 struct Lit {
     first: f32,
     bins: Vec<f32>,
 }
 
-/// The edge of a shadow is known to this, px.
+/// Resolution of a shadow's edge, px.
 const BIN_PX: f32 = 0.25;
-/// A surface does not shade itself: its disparity differs by less than this within a bin.
+/// Tolerance, px: a surface does not shadow itself, as its disparity differs by less than this within a
+/// bin.
 const HARDLY_NEARER_PX: f32 = 0.5;
 
 impl Lit {
@@ -76,7 +77,7 @@ impl Lit {
         let count = ((width as f32 + 1.0 - first) / BIN_PX) as usize;
         let mut lit = Lit { first, bins: vec![f32::NEG_INFINITY; count] };
         for (u, &d) in disparity.iter().enumerate() {
-            // A pixel covers from its own middle half-way to its neighbours on the same surface.
+            // A pixel extends half-way to its neighbours on the same surface.
             let half = |other: Option<usize>| match other {
                 Some(v) if v < width && surface[v] == surface[u] && disparity[v].is_finite() => {
                     let gap = (v as f32 - disparity[v]) - (u as f32 - d);

@@ -1,4 +1,4 @@
-//! Sub-pixel interpolation leans.
+//! Sub-pixel interpolation is biased towards whole pixels.
 
 use std::f32::consts::TAU;
 
@@ -31,22 +31,22 @@ pub(super) static CARD: Card = Card {
     ..Card::BASE
 };
 
-/// Disparities are px of the matcher as far as baseline and focal length are known.
+/// Relative error of the disparity scale, from baseline and focal length.
 const SCALE_ERROR: f64 = 0.01;
 
 impl Effect for PixelLocking {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let amplitude = settings.at(0) as f32;
         for d in &mut exposure.disparity {
-            // Between two whole pixels the answer is drawn to the nearer one.
+            // Between two whole pixels the disparity is pulled to the nearer one.
             *d -= amplitude * (TAU * d.fract()).sin();
         }
     }
 
-    /// A period of one pixel, give or take what focal length and baseline are off.
+    /// A period of one pixel, within the error of focal length and baseline.
     fn shapes(&self, bounds: &Bounds) -> Vec<Basis> {
         const OFF: f64 = 0.03;
-        // A quarter of a cycle over the range of disparities.
+        // Steps of a quarter of a cycle over the range of disparities.
         let step = 0.25 / (bounds.reach.disparity[1] - bounds.reach.disparity[0]).max(1.0);
         let half = ((OFF / step).ceil() as i64).clamp(1, 12);
         let period = |k: i64| 1.0 / (1.0 + OFF * k as f64 / half as f64);
@@ -81,7 +81,7 @@ impl Effect for PixelLocking {
     }
 }
 
-/// In the phase of the disparity.
+/// Waves in the phase of the disparity.
 fn waves(period_px: f64, harmonics: usize) -> Basis {
     Basis::waves(Coordinate::Disparity, period_px, harmonics)
 }

@@ -35,9 +35,9 @@ impl Effect for RadialDisparityBias {
         exposure.shift_disparity(|i| k * radius(i).powi(2));
     }
 
-    /// Two orders for what is nearly a parabola, four for a wavy one. One that grows faster than the
-    /// disparity grows with z less than in proportion: at the square it has the same depth at every
-    /// distance, which is the target's shape and not the sensor's.
+    /// Two orders for what is nearly a parabola, four for a wavy one. A bowl that grows faster than the
+    /// disparity grows with z less than in proportion: with the square of the disparity its depth is the
+    /// same at every distance, which is the target's shape and not the sensor's.
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
         const POWERS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
         let of = |orders: usize| POWERS.map(|power| bowl(power, orders));
@@ -50,7 +50,7 @@ impl Effect for RadialDisparityBias {
         0.5
     }
 
-    /// The bowl that comes nearest at the middle (in ratio) of the disparities.
+    /// Nearest parabola at the geometric mean of the disparities.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let Basis::Powers { times, .. } = *fit.shape else { return Vec::new() };
         let disparity_power = times.power_of_disparity().unwrap_or(0.0);
@@ -73,7 +73,7 @@ impl Effect for RadialDisparityBias {
     }
 }
 
-/// A bowl whose depth goes with a power of the disparity.
+/// A bowl that scales with a power of the disparity.
 fn bowl(disparity_power: f64, orders: usize) -> Basis {
     Basis::powers(Coordinate::RadiusSquared, orders, Modulation::power(disparity_power))
 }

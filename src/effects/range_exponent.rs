@@ -38,7 +38,7 @@ impl Effect for RangeExponent {
         power_laws()
     }
 
-    /// Between the ends of what was seen.
+    /// Mean exponent between the ends of the depth range.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let [near, far] = fit.reach.z;
         let at = |z: f64| PixelContext { z, ..PixelContext::default() };
@@ -57,25 +57,25 @@ impl Effect for RangeExponent {
     }
 }
 
-/// Where the noise is the form's: the middle (in ratio) of a Kinect's 1 to 4 m.
+/// Depth at which nothing changes, m: the geometric mean of a Kinect's 1 to 4 m.
 const PIVOT_M: f64 = 2.0;
 
-/// One column each.
+/// Candidate laws, one column each.
 fn power_laws() -> Vec<Basis> {
     let powers = [3.0, 4.0, 6.0];
     let growths = powers.into_iter().flat_map(|power| [2.0, 4.0, 8.0].map(|unit| growth(unit, power)));
     std::iter::once(power_law()).chain(growths).collect()
 }
 
-/// Another power throughout.
+/// Another power over the whole range.
 fn power_law() -> Basis {
     Basis::powers(Coordinate::LogRatio(PIVOT_M), 1, Modulation::One)
 }
 
-/// Noise of another power beside that of the form, as variances add: near it is nothing.
+/// Noise of another power added in quadrature to that of the form; negligible at short range.
 ///
-/// With these units and powers one column follows, from .8 to 4 m, z^4 in quadrature, a kink rounded over
-/// half a metre and straight or square growth from 1 to 1.5 m on to .3 % of its square.
+/// With these units and powers one column reproduces, from 0.8 to 4 m, z^4 in quadrature, a kink rounded
+/// over half a metre, and linear or quadratic growth from 1 to 1.5 m on, to 0.3 % of its square.
 fn growth(unit_m: f64, power: f64) -> Basis {
     Basis::Log1p { over: Coordinate::DepthPower { unit_m, power } }
 }
@@ -84,7 +84,7 @@ fn growth(unit_m: f64, power: f64) -> Basis {
 mod tests {
     use super::*;
 
-    /// Of the square of a change of log variance from .8 to 4 m, what the best of `shapes` leaves.
+    /// Share of the square of a change of log variance from 0.8 to 4 m that the best of `shapes` leaves.
     fn left(shapes: &[Basis], change: impl Fn(f64) -> f64) -> f64 {
         let depths = || (0..=64).map(|n| 0.8 + 0.05 * f64::from(n));
         let of = |shape: &Basis| {
@@ -99,8 +99,8 @@ mod tests {
         shapes.iter().map(of).fold(1.0, f64::min)
     }
 
-    /// Noise of other formulas than ours, small and large, keeps the name; noise that grows and falls
-    /// again does not.
+    /// Noise that grows by other formulas than ours, small and large, keeps the name; noise that grows and
+    /// falls again does not.
     #[test]
     fn one_column_follows_other_growths() {
         let shapes = power_laws();

@@ -1,4 +1,4 @@
-//! The file holds the ray length.
+//! The file holds the ray length instead of the depth.
 
 use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
@@ -45,8 +45,8 @@ impl Effect for RangeNotDepth {
         1.0
     }
 
-    /// A share lies between 0 and 1; or it is -1, where the model takes all of it to be there and the sensor has
-    /// none. Anything else is another bowl.
+    /// A share lies between 0 and 1, or is -1 where the model assumes all of it and the sensor has none.
+    /// Anything else is another bowl.
     fn agrees_with(&self, _: Option<&Flat>, _: &Basis, coefficients: &[f64]) -> bool {
         coefficients.iter().all(|&share| {
             (-SHARE_ERROR..=1.0 + SHARE_ERROR).contains(&share) || (share + 1.0).abs() <= SHARE_ERROR
@@ -66,10 +66,10 @@ impl Effect for RangeNotDepth {
     }
 }
 
-/// A share that was fitted is off by this, beside another cause or by the formula's own error.
+/// Tolerance of a fitted share, for another cause fitted beside it or the formula's own error.
 const SHARE_ERROR: f64 = 0.1;
 
-/// What the disparity falls short by where the ray is taken for the depth.
+/// Shortfall of the disparity where the ray length is taken for the depth.
 pub const RAY_FOR_DEPTH: Basis = Basis::powers(Coordinate::Foreshortening, 1, Modulation::Disparity);
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The free shapes of a model, applied in place of the catalogue's formulas.
+//! The fitted shapes of a model, applied in place of the catalogue's formulas.
 
 use rayon::prelude::*;
 
@@ -8,8 +8,8 @@ use crate::scene::Seen;
 use crate::stats::median_in_place;
 use crate::terms::{Needs, PixelContext, Pixels, Statistic, Term, edge_distances};
 
-/// All terms of one statistic together: a bias shifts the disparity, a variance term scales the
-/// variance, at what each pixel sees undisturbed.
+/// All terms of one statistic: a bias shifts the disparity, a variance term scales the variance, evaluated
+/// at what each pixel sees undisturbed.
 pub struct Shape {
     card: &'static Card,
     terms: Vec<Term>,
@@ -38,7 +38,7 @@ static VARIANCE: Card = Card {
 };
 
 impl Shape {
-    /// The terms that an exposure can be changed by, those of the bias and of the variance apart.
+    /// Groups terms into a shape of the bias and one of the variance.
     pub(super) fn of(terms: impl Iterator<Item = Term>) -> impl Iterator<Item = Shape> {
         let (bias, variance): (Vec<Term>, Vec<Term>) =
             terms.partition(|t| t.statistic == Statistic::Bias);
@@ -83,8 +83,8 @@ impl Effect for Shape {
     }
 }
 
-/// The terms were found on raw values, whose rounding is part of the variance but not of
-/// `sigma`: it is added before and taken off after.
+/// Scales the variance. The terms were fitted to raw values, whose rounding is part of the variance but not
+/// of `sigma`: it is added before and subtracted after.
 fn scale_variance(exposure: &mut Exposure, log_ratio: &[f32]) {
     let rounding = rounding_variance(exposure);
     for (i, sigma) in exposure.sigma.iter_mut().enumerate() {
@@ -94,7 +94,7 @@ fn scale_variance(exposure: &mut Exposure, log_ratio: &[f32]) {
     }
 }
 
-/// Variance of a raw value's rounding at a depth, m^2: uniform over a step.
+/// Rounding variance of a raw value at a depth, m^2: uniform over a step.
 fn rounding_variance(exposure: &Exposure) -> impl Fn(f32) -> f32 + use<> {
     let code = exposure.sensor.code;
     move |z| {
@@ -125,14 +125,14 @@ fn values(terms: &[&Term], exposure: &Exposure) -> Vec<f32> {
     sums
 }
 
-/// What is known of the places that a view's pixels see.
+/// Context of what a view's pixels see.
 struct Scene<'a> {
     exposure: &'a Exposure<'a>,
     pixels: Pixels<'a>,
     needs: Needs,
-    /// To the target's edge, px; empty where no term asks.
+    /// Distance to the target's edge, px; empty where no term needs it.
     edge: Vec<f32>,
-    /// Median of the share of light given back.
+    /// Median reflectance.
     grey: f64,
 }
 
@@ -151,7 +151,8 @@ impl<'a> Scene<'a> {
         Scene { exposure, pixels, needs, edge, grey }
     }
 
-    /// A board's shape needs the board, a curve over the temperature needs a thermometer.
+    /// Whether a term can be evaluated at pixel `i`: a board's shape needs the board, a curve over the
+    /// temperature needs a measured temperature.
     fn knows(&self, term: &Term, i: usize) -> bool {
         let seen = self.exposure.seen;
         let needs = term.needs();
@@ -173,7 +174,7 @@ impl<'a> Scene<'a> {
             place.light = f64::from(seen.albedo[i]) / self.grey;
         }
         if self.needs.slope {
-            // n . X is the same all over the surface: the plane is q = n / (n . X).
+            // n . X is constant on the surface: the plane is q = n / (n . X).
             let normal = nalgebra::Vector3::from(seen.normal[i].map(f64::from));
             let point = nalgebra::Vector3::new(place.x, place.y, 1.0) * z;
             place.lean_on(&Plane::new(normal / normal.dot(&point)), &self.pixels);

@@ -34,7 +34,7 @@ impl Effect for SlopeNoise {
         let lateral = settings.at(0) / exposure.sensor.camera.fx;
         let seen = exposure.seen;
         for i in 0..exposure.pixels() {
-            // Of the depth on the ray (x, y, 1) of a plane with this normal: z tan(theta) on the axis,
+            // Depth gradient on the ray (x, y, 1) of a plane with this normal: z tan(theta) on the axis,
             // more where the plane recedes.
             let [a, b, c] = seen.normal[i].map(f64::from);
             let (x, y) = exposure.rays.at(i);
@@ -56,7 +56,7 @@ impl Effect for SlopeNoise {
         else {
             return Vec::new();
         };
-        // A shape of another width, more or less of it, says the same where it doubles the variance.
+        // Match the law with coefficient one where this shape's width doubles the variance.
         let doubled = |b: &[f64]| (2f64.powf(b[0]) - 1.0).max(0.0);
         vec![fit.estimate("sigma_lateral_px", &|b| lateral_px * doubled(b).sqrt())]
     }
@@ -71,10 +71,10 @@ impl Effect for SlopeNoise {
     }
 }
 
-/// Steps of the root of two: between two of them a width is off by a fifth, and its curve by little.
+/// Steps of the square root of two: a width between two of them is off by a fifth, and its curve by little.
 const WIDTHS_PX: [f64; 9] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.13, 1.6];
 
-/// Noise of the place in the picture, through the slope of the target.
+/// Lateral noise in the picture, seen through the slope of the target.
 fn blur(lateral_px: f64) -> Basis {
     Basis::Log1p { over: Coordinate::Blur(lateral_px) }
 }
@@ -86,8 +86,8 @@ mod tests {
     use crate::simulate::kinect_v1;
     use crate::terms::Pixels;
 
-    /// In depth: z^2 over fx b times the disparity's is the width times the depth's change from pixel to pixel,
-    /// by the plane itself; or times z tan(theta) / fx, which is the same on the optical axis alone.
+    /// In depth (times z^2 / (fx b)) the noise is the width times the plane's depth change per pixel, or
+    /// times z tan(theta) / fx, which agrees with it on the optical axis alone.
     #[test]
     fn a_width_is_noise_of_the_depth_by_the_slope() {
         const WIDTH_PX: f64 = 0.7;

@@ -49,17 +49,17 @@ impl Effect for SpatialCorrelation {
     }
 }
 
-/// Mean over a square window of `side` px (a fraction weighs the outermost pixels), the variance
-/// kept. The image is taken as wrapped, so that the border is like the middle.
+/// Moving mean over a square window of `side` px (a fraction weights the outermost pixels), rescaled to
+/// keep the variance. The image wraps around, so that the border is like the middle.
 fn window_mean(field: &mut [f32], width: usize, side: f64) {
     let (window, pixels) = (Window::of(side), field.len());
     (0..pixels).step_by(width).for_each(|row| window.along(field, row..row + width));
     (0..width).for_each(|column| window.along(field, (column..pixels).step_by(width)));
 }
 
-/// The weights of a moving mean: one, but `edge` at both ends.
+/// The weights of a moving mean: one, except `edge` at both ends.
 struct Window {
-    /// The outermost pixels lie this far from the middle.
+    /// Distance of the outermost pixels from the middle.
     reach: usize,
     edge: f64,
     /// Makes the squares of all weights sum to one.
@@ -74,7 +74,7 @@ impl Window {
         Window { reach: reach as usize, edge, norm: 1.0 / squares.sqrt() }
     }
 
-    /// A running sum over a line of pixels: one comes in, one goes out, whatever the window's side.
+    /// Running sum over a line of pixels, at a cost independent of the window's side.
     fn along(&self, field: &mut [f32], line: impl Iterator<Item = usize>) {
         let line: Vec<usize> = line.collect();
         let wrapped = |i: usize| (i as isize - self.reach as isize).rem_euclid(line.len() as isize);
@@ -93,7 +93,7 @@ impl Window {
 mod tests {
     use super::*;
 
-    /// A single one spreads into the window's weights, the fraction at its ends, across the border.
+    /// A unit impulse spreads into the window's weights, the fraction at its ends, across the border.
     #[test]
     fn a_point_becomes_the_window() {
         for side in [1.5, 3.0, 4.0, 8.4, 9.0] {

@@ -51,15 +51,14 @@ impl Effect for TargetBow {
         }
     }
 
-    /// Bent along its sides; pressed or swollen in its middle, which a clamped plate's r^4 and a bump's
-    /// r^6 describe (Timoshenko and Woinowsky-Krieger 1959, chapter 3); or otherwise.
+    /// Bent along its sides; dented or bulging in its middle, as a clamped plate's r^4 and a bump's r^6
+    /// describe (Timoshenko and Woinowsky-Krieger 1959, chapter 3); or otherwise.
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
         vec![Basis::relief(2), Basis::dome(3), Basis::relief(4)]
     }
 
-    /// A board bends by about 1 mm at 1 m, and by 1.5 mm half a metre from its middle where it is a
-    /// bad one. One whose flatness is stated bends by anything up to that, either way, over what was
-    /// seen of it: a rectangular distribution.
+    /// A board bends by about 1 mm at 1 m, a poor one by 1.5 mm half a metre from its middle. One of stated
+    /// flatness bends by anything up to that, either way, over the part seen: a rectangular distribution.
     fn usual(&self, shape: &Basis, k: usize, flat: Option<&Flat>) -> f64 {
         let degree = match (shape, k) {
             (Basis::Powers { .. }, k) => 2 * (k as i32 + 1),
@@ -80,8 +79,8 @@ impl Effect for TargetBow {
         })
     }
 
-    /// Over the reach of the board that was seen, along the side that is bent more; of a dome along the
-    /// longer.
+    /// Sagitta over the part of the board that was seen, along the side that is bent more; of a dome, along
+    /// the longer.
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {
         let (right, down) = (half_square(fit.reach.right), half_square(fit.reach.down));
         let is_dome = matches!(fit.shape, Basis::Powers { .. });
@@ -97,7 +96,7 @@ impl Effect for TargetBow {
         };
         vec![
             fit.estimate("sagitta_m", &sagitta),
-            // The board's pixels end within a few of its edge.
+            // The board's pixels end within a few pixels of its edge.
             Estimate::given("span_m", span[1] - span[0], f64::NAN),
         ]
     }
@@ -109,14 +108,14 @@ impl Effect for TargetBow {
     }
 }
 
-/// Of a board, half a metre from its middle, m.
+/// Bow of a board, half a metre from its middle, m.
 const BOW_M: f64 = 0.0015;
 
-/// A bend is fitted beside all else that bends a picture, and to the corners of what was seen: up to
-/// this many times the stated flatness it is a flat board's.
+/// A bend is fitted together with all else that bends a picture, and up to the corners of what was seen: up
+/// to this multiple of the stated flatness it is compatible with a flat board.
 const BEYOND_STATED: f64 = 2.0;
 
-/// From the lowest to the highest place of a surface over what was seen of it, its slope taken out, m.
+/// Height range of a surface over the part of it seen, with its slope removed, m.
 fn relief_m(flat: &Flat, shape: &Basis, coefficients: &[f64]) -> f64 {
     const NODES: usize = 9;
     let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
@@ -124,13 +123,13 @@ fn relief_m(flat: &Flat, shape: &Basis, coefficients: &[f64]) -> f64 {
     let mut places: Vec<[f64; 3]> = Vec::new();
     for right in even(flat.right, NODES) {
         for down in even(flat.down, NODES) {
-            // So far from the sensor that a lift is told in metres.
+            // Unit disparity and distance, so that a lift is in metres.
             let place = PixelContext { right, down, disparity: 1.0, rho: 1.0, ..Default::default() };
             let height = shape.value(coefficients, &place);
             places.push([right - at_right, down - at_down, height]);
         }
     }
-    // The grid is even about its middle, so that both slopes are had one by one.
+    // The grid is symmetric about its middle, so the two slopes are independent.
     let slope = |k: usize| {
         let square: f64 = places.iter().map(|p| p[k] * p[k]).sum();
         places.iter().map(|p| p[k] * p[2]).sum::<f64>() / square.max(f64::MIN_POSITIVE)

@@ -28,7 +28,7 @@ impl Effect for TargetMotion {
         let gone = settings.at(0) * exposure.instant.view_s;
         for i in 0..exposure.pixels() {
             if exposure.seen.is_target(i) {
-                // A shift along the axis lifts the plane by its share across it.
+                // A shift along the axis lifts the plane by its component along the normal.
                 let lift = f64::from(exposure.seen.normal[i][2]) * gone;
                 exposure.depth[i] = exposure.meet(i, exposure.rays.at(i), lift) as f32;
             }

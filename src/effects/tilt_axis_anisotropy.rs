@@ -31,14 +31,15 @@ impl Effect for TiltAxisAnisotropy {
         let ratio = settings.at(0);
         for i in 0..exposure.pixels() {
             let (theta, azimuth) = (exposure.seen.theta(i), exposure.seen.azimuth(i));
-            // Half of it up along the baseline, half of it down across: the mean over azimuths stays.
+            // Half of it raises sigma along the baseline, half lowers it across: the mean over azimuths
+            // stays.
             let tilt = (theta.sin() / REFERENCE_TILT_RAD.sin()).powi(2);
             exposure.sigma[i] *= ratio.powf(0.5 * tilt * (2.0 * azimuth).cos()) as f32;
         }
     }
 
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
-        // Up along the baseline and down across it, or up along it alone.
+        // Raised along the baseline and lowered across it, or raised along it alone.
         let both = [Coordinate::Alignment, Coordinate::AlongBaseline];
         both.iter().flat_map(|over| LAWS.map(|law| Basis::powers(*over, 1, law))).collect()
     }
@@ -67,26 +68,26 @@ impl Effect for TiltAxisAnisotropy {
     }
 }
 
-/// Where `ratio` is counted; a frontal plane has no direction of tilt.
+/// Tilt at which `ratio` is defined; a frontal plane has no direction of tilt.
 const REFERENCE_TILT_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
 /// The law of the card's own formula.
 const FORWARD: Modulation = Modulation::TiltPower(2);
 
-/// How it grows with the tilt: as foreshortening does, or as the gradient of the disparity.
+/// Growth with the tilt: as foreshortening, or as the disparity gradient.
 const LAWS: [Modulation; 3] =
     [Modulation::TiltPower(1), Modulation::TiltPower(2), Modulation::SlopeSquared];
 
-/// Half of what lies between sin^2 and tan^2 at the reference, as a share of the logarithm of the
-/// ratio, where both fit the recording: a window that is stretched far lies between them. With tilts
-/// evenly up to `steepest` and a signal that grows with their square, the mean tilt that decides is
-/// 5/6 of it.
+/// Uncertainty of the law, as a share of the log ratio: half the difference between sin^2 and tan^2 at the
+/// reference, where both fit the recording; a strongly stretched window lies between them. With tilts
+/// spread evenly up to `steepest` and a signal that grows with their square, the effective tilt is 5/6 of
+/// it.
 fn between_laws(steepest: f64) -> f64 {
     let decides = (5.0 / 6.0 * steepest).cos() / REFERENCE_TILT_RAD.cos();
     0.5 * (decides * decides - 1.0).abs()
 }
 
-/// Along the baseline against across it, fading as the tilt does.
+/// Contrast of tilts along and across the baseline, vanishing with the tilt.
 fn along_baseline(law: Modulation) -> Basis {
     Basis::powers(Coordinate::Alignment, 1, law)
 }
@@ -107,7 +108,8 @@ mod tests {
         TiltAxisAnisotropy.estimates(&fit)[0]
     }
 
-    /// Up along the baseline and down across it by as much, or up along it alone by twice that: the same ratio.
+    /// Raised along the baseline and lowered across it by as much, or raised along it alone by twice that:
+    /// the same ratio.
     #[test]
     fn the_ratio_is_between_the_two_directions() {
         let of = |over, coefficient| told(Basis::powers(over, 1, FORWARD), coefficient, 1.0).value;
@@ -116,8 +118,8 @@ mod tests {
         assert!(ratios.iter().all(|ratio| (ratio - 1.5).abs() < 1e-9), "{ratios:?}");
     }
 
-    /// Every law says the same of the tilt that the ratio is counted at; a recording whose tilts end
-    /// far below it says less of it than one that passes it.
+    /// All laws agree at the reference tilt; a recording whose tilts end far below it determines less than
+    /// one that goes beyond.
     #[test]
     fn the_ratio_is_counted_at_sixty_degrees() {
         for (law, at_reference) in LAWS.into_iter().zip([0.75f64.sqrt(), 0.75, 3.0]) {

@@ -1,26 +1,26 @@
-//! What an effect and those who look for it, or take it out again, say to each other.
+//! Types shared by effects, the diagnosis that looks for them and the correction that removes them.
 
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Extent, Term};
 
-/// What a recording can show.
+/// Limits of what a recording can show.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounds<'a> {
     pub camera: &'a Camera,
     pub reach: &'a Extent,
-    /// Side of the smallest patch that is looked at, px.
+    /// Side of the smallest patch that is examined, px.
     pub patch_px: f64,
-    /// What is stated of the target's surface.
+    /// Stated flatness of the target.
     pub flat: Option<Flat>,
-    /// Of the camera, where it is known.
+    /// Kind of camera, where known.
     pub kind: Option<SensorKind>,
 }
 
-/// A target that is stated to be flat, and how much of it was seen, m, about its middle.
+/// A target that is stated to be flat, and the extent of it that was seen, m, about its middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flat {
-    /// Distance of the two parallel planes that hold its surface, m.
+    /// Distance between the two parallel planes that enclose its surface, m.
     pub flatness_m: f64,
     pub right: [f64; 2],
     pub down: [f64; 2],
@@ -32,27 +32,27 @@ pub type Known<'a> = &'a dyn Fn(&str) -> Option<f64>;
 /// What undoes an effect in a depth image.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Inverse {
-    /// Taken off the disparity.
+    /// Subtracted from the disparity.
     Term(Term),
     /// Stored depth over true depth.
     Scale(f64),
-    /// Stored depth over true depth rises by `relative` in the course of a session.
+    /// Stored depth over true depth rises by `relative` over a session.
     Drift { relative: f64, time_constant_s: f64 },
-    /// Depth holds this share of what the ray is longer than the depth.
+    /// Depth contains this share of the excess of ray length over depth.
     AlongRay { share: f64 },
-    /// Whole columns step, differently in every image, which shows how (`measure::ColumnSteps`).
+    /// Steps of whole columns, different in every image and estimated from it (`measure::ColumnSteps`).
     ColumnSteps,
-    /// Disparity is drawn to whole pixels by a sine of this height.
+    /// Disparity is pulled to whole pixels by a sine of this amplitude.
     Locking { amplitude_px: f64 },
 }
 
-/// How the smallest effect that a recording could have shown is told.
+/// How to report the smallest effect that a recording could have shown.
 #[derive(Debug, Clone)]
 pub struct Smallest {
     pub parameter: &'static str,
     pub shape: Basis,
-    /// The direction in which the shape's coefficients grow with the effect.
+    /// Direction in which the shape's coefficients grow with the effect.
     pub unit: Vec<f64>,
-    /// The parameter, of so many units.
+    /// The parameter as a function of the number of units.
     pub of: fn(f64) -> f64,
 }

@@ -23,7 +23,7 @@ pub(super) static CARD: Card = Card {
     confused_with: "slope-noise: even a frontal target is met at an angle off the axis, but that grows with the tilt",
     reference: "Choo et al. 2014: radial factors beside depth; cos^4 law",
     is_symptom: true,
-    // Lenses that shade as cos^4 or their rim alone: 0.21 rms of twelve sets, seed 7000.
+    // Lenses that shade as cos^4 or at the rim alone: 0.21 rms over twelve sets, seed 7000.
     formula_error: 0.2,
     ..Card::BASE
 };
@@ -35,7 +35,7 @@ impl Effect for Vignetting {
         for i in 0..exposure.pixels() {
             let factor = 1.0 + growth * radius(i).powi(2);
             exposure.sigma[i] *= factor as f32;
-            // Shot noise: the standard deviation goes with one over the root of the light.
+            // Shot noise: the standard deviation goes with the inverse square root of the light.
             exposure.light[i] /= (factor * factor) as f32;
         }
     }
@@ -64,7 +64,7 @@ impl Effect for Vignetting {
     }
 }
 
-/// Towards the corners.
+/// Growth towards the corners.
 fn darker(orders: usize) -> Basis {
     Basis::powers(Coordinate::RadiusSquared, orders, Modulation::One)
 }

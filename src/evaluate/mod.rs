@@ -1,9 +1,9 @@
-//! How far an estimated trajectory is from the true one, as the scripts of the TUM RGB-D benchmark
-//! compute it (Sturm, Engelhard, Endres, Burgard, Cremers, "A benchmark for the evaluation of RGB-D
-//! SLAM systems", IROS 2012).
+//! Compares an estimated trajectory with the true one as the scripts of the TUM RGB-D benchmark do
+//! (Sturm, Engelhard, Endres, Burgard, Cremers, "A benchmark for the evaluation of RGB-D SLAM systems",
+//! IROS 2012).
 //!
-//! * ATE: positions of associated poses after the best rigid alignment ([`align`], no scale).
-//! * RPE: the motion over a fixed interval, estimated against true, needs no alignment.
+//! * ATE: distances of associated positions after the best rigid alignment ([`align`], no scale).
+//! * RPE: estimated against true motion over a fixed interval; needs no alignment.
 
 mod offset;
 mod rpe;
@@ -23,14 +23,14 @@ use crate::trajectory::{Pose, associate};
 pub struct Evaluation {
     pub ate: Ate,
     pub rpe: Rpe,
-    /// What the estimate's clock lacks of the truth's, where it can be told.
+    /// Offset to add to the estimate's stamps, where it can be determined.
     pub offset: Option<ClockOffset>,
-    /// What was found odd.
+    /// Remarks on anything unusual.
     pub remarks: Vec<String>,
 }
 
-/// Of poses in time order.
-/// An error when too few of them belong to the same moments.
+/// Evaluates poses in time order.
+/// Fails if too few of them belong to the same moments.
 pub fn evaluate(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Evaluation> {
     let offset = clock_offset(truth, estimate);
     let told = offset.filter(ClockOffset::is_significant).map(|o| {
@@ -50,8 +50,8 @@ pub fn evaluate(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Evalu
     })
 }
 
-/// Estimated trajectories begin at the identity, as this program's do, or as often as there are
-/// images; true ones in a laboratory's coordinates, several times as often.
+/// Remark if the two seem to be swapped. Estimates begin at the identity, as this program's do, or have a
+/// pose per image; true trajectories are in laboratory coordinates and several times as dense.
 fn swapped(truth: &[Pose], estimate: &[Pose]) -> Option<String> {
     let at_identity = |poses: &[Pose]| {
         poses.first().is_some_and(|pose| {
@@ -75,18 +75,19 @@ fn swapped(truth: &[Pose], estimate: &[Pose]) -> Option<String> {
     })
 }
 
-/// Of a pose printed with six digits, m and rad.
+/// Tolerance for a pose printed with six digits, m and rad.
 const AT_IDENTITY: f64 = 1e-6;
-/// Motion capture has 100 poses a second, images come 30 times: three times as often.
+/// Ratio of intervals that suggests a swap. Motion capture has 100 poses a second, images come 30 times: a
+/// ratio of three.
 const DENSER: f64 = 2.0;
 
-/// A list of errors in figures, in their unit.
+/// Statistics of a list of errors, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
     pub rmse: f64,
     pub mean: f64,
     pub median: f64,
-    /// Of the population: divided by n.
+    /// Standard deviation of the population, divided by n.
     pub std: f64,
     pub min: f64,
     pub max: f64,
@@ -94,7 +95,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// `None` of nothing.
+    /// `None` for an empty list.
     pub fn of(errors: &[f64]) -> Option<Self> {
         if errors.is_empty() {
             return None;
@@ -119,7 +120,7 @@ impl Spread {
         Spread { rmse, mean, median, std, min, max, pairs: self.pairs }
     }
 
-    /// By name, as the TUM scripts order them.
+    /// The values with their names, in the order of the TUM scripts.
     pub fn figures(&self) -> [(&'static str, f64); 6] {
         let Spread { rmse, mean, median, std, min, max, .. } = *self;
         let names = ["rmse", "mean", "median", "std", "min", "max"];
@@ -128,7 +129,7 @@ impl Spread {
     }
 }
 
-/// The two trajectories share too few moments.
+/// Error of two trajectories that share too few moments.
 fn too_few(truth: &[Pose], estimate: &[Pose], pairs: usize) -> Error {
     let span = |poses: &[Pose]| match (poses.first(), poses.last()) {
         (Some(a), Some(b)) => format!("{:.2} to {:.2} s", a.stamp, b.stamp),
@@ -144,24 +145,24 @@ fn too_few(truth: &[Pose], estimate: &[Pose], pairs: usize) -> Error {
     }
 }
 
-/// Distances of associated positions after alignment.
+/// Absolute trajectory error: distances of associated positions after alignment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ate {
     /// m.
     pub error: Spread,
-    /// What was aligned: the estimate's world in the true one.
+    /// The alignment: the estimate's world in the true one.
     pub truth_from_estimate: Isometry3<f64>,
-    /// Stamp of the estimate, s, and its distance, m.
+    /// Stamp of the estimate, s, and its distance from the truth, m.
     pub each: Vec<(f64, f64)>,
 }
 
-/// Fewer positions determine no rotation.
+/// Fewest positions that determine a rotation.
 const MIN_PAIRS: usize = 3;
-/// Stamps of one moment differ by less, s (the scripts' `max_difference`).
+/// Largest difference of associated stamps, s (the scripts' `max_difference`).
 const MAX_DIFFERENCE_S: f64 = 0.02;
 
-/// Of poses in time order.
-/// An error when fewer than three of them belong to the same moments.
+/// Absolute error of poses in time order.
+/// Fails if fewer than three of them belong to the same moments.
 pub fn absolute(truth: &[Pose], estimate: &[Pose]) -> Result<Ate> {
     let stamps = |poses: &[Pose]| poses.iter().map(|p| p.stamp).collect::<Vec<f64>>();
     let pairs = associate(&stamps(truth), &stamps(estimate), MAX_DIFFERENCE_S);
@@ -180,8 +181,8 @@ pub fn absolute(truth: &[Pose], estimate: &[Pose]) -> Result<Ate> {
     Ok(Ate { error, truth_from_estimate, each })
 }
 
-/// The rigid motion that brings the second points nearest to the first, in the least squares sense
-/// (Horn 1987). `None` of fewer than three pairs.
+/// The rigid motion that maps the second points onto the first in the least-squares sense (Horn 1987). `None`
+/// for fewer than three pairs.
 pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Isometry3<f64>> {
     if pairs.len() < MIN_PAIRS {
         return None;
@@ -194,12 +195,12 @@ pub fn align(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Isometry3<f64>> {
     Some(Isometry3::from_parts(Translation3::from(to - rotation * from), rotation))
 }
 
-/// Rounds of the search for eigenvalues, which settles in a few.
+/// Limit for the eigenvalue iteration, which converges in a few steps.
 const MAX_ROUNDS: usize = 1000;
 
-/// What turns the second vectors nearest to the first, whose sum of products is `spread`: Horn's
-/// quaternion. nalgebra's decomposition of 3 x 3 squares the spread, which leaves nothing of a path that
-/// is 10,000 times as long as it is wide; and a quaternion is never a reflection.
+/// The rotation from the second vectors to the first, whose sum of outer products is `spread`, by Horn's
+/// quaternion. nalgebra's 3 x 3 decomposition squares `spread`, which loses all precision for a path 10,000
+/// times as long as it is wide. Also, a quaternion is never a reflection.
 fn nearest_rotation(spread: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let s = |to: usize, from: usize| spread[(to, from)];
     let odd = Vector3::new(s(2, 1) - s(1, 2), s(0, 2) - s(2, 0), s(1, 0) - s(0, 1));

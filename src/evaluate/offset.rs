@@ -1,7 +1,7 @@
-//! The offset between two trajectories' clocks, by how they turn.
+//! Estimates the offset between two trajectories' clocks from their rotations.
 //!
-//! The same turning seen by two clocks is the same course shifted. Positions would do less well: they
-//! drift, and a constant velocity hides a shift.
+//! Both clocks see the same angular motion, shifted in time. Positions would do less well: they drift, and a
+//! constant velocity hides a shift.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -9,7 +9,7 @@ use super::nearest_rotation;
 use crate::stats::{MAD_TO_SIGMA, TUKEY, median};
 use crate::trajectory::Pose;
 
-/// What the estimate's clock lacks of the truth's, s, with its standard error.
+/// The offset to add to the estimate's stamps, s, with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockOffset {
     pub seconds: f64,
@@ -17,39 +17,39 @@ pub struct ClockOffset {
 }
 
 impl ClockOffset {
-    /// Beyond what chance and the truth's own sampling make.
+    /// Whether it exceeds chance and the truth's own sampling.
     pub fn is_significant(&self) -> bool {
         self.seconds.abs() > (SURE * self.std_error_s).max(MIN_S)
     }
 }
 
-/// Standard errors: a chance of 0.3 % for Gaussian errors.
+/// Threshold in standard errors: 0.3 % false alarms for Gaussian errors.
 const SURE: f64 = 3.0;
-/// Motion capture has a pose every 10 ms; a tenth of that is not followed between them.
+/// Smallest significant offset, s: a tenth of the 10 ms between motion-capture poses, which resolve no less.
 const MIN_S: f64 = 0.001;
-/// Motions are taken over this, s: over a frame alone a mapper's noise is as large as what it turns.
+/// Interval of the motions, s: over a single frame a mapper's noise is as large as its rotation.
 const INTERVAL_S: f64 = 0.1;
-/// Offsets that are tried, s, and their step: a tenth of the interval.
+/// Range of the offsets that are tried, s, and their step, a tenth of the interval.
 const REACH_S: f64 = 0.5;
 const STEP_S: f64 = 0.01;
-/// Fewer motions say nothing.
+/// Fewest motions for an estimate.
 const MIN_MOTIONS: usize = 30;
-/// True poses further apart are not interpolated, s.
+/// Longest gap over which true poses are interpolated, s.
 const MAX_GAP_S: f64 = 0.1;
-/// Neighbouring motions err together; parts of the trajectory do not.
+/// Number of parts for the standard error: neighbouring motions have correlated errors, parts do not.
 const PARTS: usize = 16;
-/// Half the step of the derivative, s.
+/// Half the step of the numerical derivative, s.
 const HALF_STEP_S: f64 = 0.005;
 
-/// A turn of the estimate, in the camera's frame at its beginning.
+/// A rotation of the estimate, in the camera's frame at its start.
 struct Turn {
     from: f64,
     to: f64,
     vector: Vector3<f64>,
 }
 
-/// The offset to add to the estimate's stamps. `None` where the trajectories turn too little or share too
-/// few moments, or where no offset within half a second fits better than those beside it.
+/// Estimates the clock offset. `None` if the trajectories turn too little or share too few moments, or if no
+/// offset within half a second fits better than its neighbours.
 pub fn clock_offset(truth: &[Pose], estimate: &[Pose]) -> Option<ClockOffset> {
     let turns = turns(estimate);
     let steps = (REACH_S / STEP_S) as i32;
@@ -95,7 +95,7 @@ fn turns(estimate: &[Pose]) -> Vec<Turn> {
     turns
 }
 
-/// The true turn between two moments.
+/// The true rotation between two moments.
 fn true_turn(truth: &[Pose], from: f64, to: f64) -> Option<Vector3<f64>> {
     let (from, to) = (rotation_at(truth, from)?, rotation_at(truth, to)?);
     Some((from.inverse() * to).scaled_axis())
@@ -112,11 +112,11 @@ fn rotation_at(truth: &[Pose], stamp: f64) -> Option<UnitQuaternion<f64>> {
     a.world_from_camera.rotation.try_slerp(&b.world_from_camera.rotation, share, 1e-9)
 }
 
-/// The turns held against the true ones at an offset.
+/// The rotations compared with the true ones at an offset.
 struct Fit<'a> {
     offset: f64,
     turns: Vec<&'a Turn>,
-    /// True turn less the estimated one, turned into the truth's frame.
+    /// Residuals: true rotation minus the estimated one in the truth's frame.
     left: Vec<Vector3<f64>>,
 }
 
@@ -127,20 +127,19 @@ impl<'a> Fit<'a> {
         if pairs.len() < MIN_MOTIONS {
             return None;
         }
-        // The marker's frame need not be the camera's.
+        // The frame of the truth's marker need not be the camera's.
         let spread = pairs.iter().map(|(t, w)| w * t.vector.transpose()).sum();
         let into = nearest_rotation(&spread)?;
         let left = pairs.iter().map(|(t, w)| w - into * t.vector).collect();
         Some(Fit { offset, turns: pairs.into_iter().map(|p| p.0).collect(), left })
     }
 
-    /// Median distance, rad: lost frames do not count.
+    /// Median residual, rad; robust against lost frames.
     fn misfit(&self) -> f64 {
         median(&mut self.left.iter().map(Vector3::norm).collect::<Vec<f64>>())
     }
 
-    /// Score and information of the offset, and the score's variance with the trajectory's parts as the
-    /// sample.
+    /// Score and information of the offset, and the variance of the score from its scatter between the parts.
     fn equations(&self, truth: &[Pose]) -> (f64, f64, f64) {
         let scale = TUKEY * MAD_TO_SIGMA * self.misfit();
         let (mut information, mut parts) = (0.0, [0.0; PARTS]);

@@ -4,8 +4,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::rng::Seed;
 
-/// A camera that looks about, by a hundred poses a second or every `interval` s; frames of the second
-/// trajectory are turned by `noise` rad each.
+/// A camera that looks around, with a pose every `interval` s; each pose is turned by `noise` rad.
 fn looking_about(interval: f64, offset: f64, noise: f64, seed: u64) -> Vec<Pose> {
     let mut rng = Seed(seed).stream("offset");
     let count = (30.0 / interval) as usize;
@@ -27,7 +26,7 @@ fn looking_about(interval: f64, offset: f64, noise: f64, seed: u64) -> Vec<Pose>
     (0..count).map(pose).collect()
 }
 
-/// To a millisecond, and within what is said of its error.
+/// To a millisecond, and within the stated error.
 #[test]
 fn a_known_offset_comes_back() {
     let truth = looking_about(0.01, 0.0, 0.0, 0);
@@ -42,7 +41,7 @@ fn a_known_offset_comes_back() {
     assert!(inside >= 15, "{inside} of 20 within two standard errors");
 }
 
-/// Whatever frame the truth's marker has, and wherever the estimate begins.
+/// For any frame of the truth's marker and any start of the estimate.
 #[test]
 fn frames_do_not_matter() {
     let marker = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.0);

@@ -1,4 +1,4 @@
-//! Relative pose error over a fixed interval: evaluate_rpe.py with `--fixed_delta`.
+//! Relative pose error over a fixed interval, as evaluate_rpe.py with `--fixed_delta`.
 
 use std::fmt::{Display, Formatter};
 
@@ -25,19 +25,19 @@ impl Display for Delta {
     }
 }
 
-/// Motions of the estimate against the true ones.
+/// Relative pose error: motions of the estimate against the true ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rpe {
     /// m.
     pub translation: Spread,
     /// rad.
     pub rotation: Spread,
-    /// Stamp at the motion's beginning, s, and its error, m.
+    /// Stamp at the start of the motion, s, and its error, m.
     pub each: Vec<(f64, f64)>,
 }
 
-/// Of poses in time order.
-/// An error when fewer than two motions have true poses at both ends.
+/// Relative error of poses in time order.
+/// Fails if fewer than two motions have true poses at both ends.
 pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> {
     if truth.len() < 2 || estimate.len() < 2 {
         return Err(too_few(truth, estimate, truth.len().min(estimate.len())));
@@ -51,7 +51,7 @@ pub fn relative(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Rpe> 
     let mut turns = Vec::new();
     for (i, from) in estimate.iter().enumerate() {
         let j = partner(estimate, i, delta);
-        // The script leaves out whatever ends at the last pose, for the interval may reach beyond.
+        // The script skips motions that end at the last pose, because the interval may extend beyond it.
         if j == estimate.len() - 1 {
             continue;
         }
@@ -82,7 +82,7 @@ fn too_short(delta: Delta) -> Error {
     }
 }
 
-/// The pose at the end of the interval that begins with pose `i`.
+/// Index of the pose at the end of the interval that starts with pose `i`.
 fn partner(estimate: &[Pose], i: usize, delta: Delta) -> usize {
     match delta {
         Delta::Seconds(s) => nearest(estimate.len(), |k| estimate[k].stamp, estimate[i].stamp + s),
@@ -90,7 +90,7 @@ fn partner(estimate: &[Pose], i: usize, delta: Delta) -> usize {
     }
 }
 
-/// A true pose farther from a stamp than twice the usual interval is not its pose (a gap), s.
+/// Largest distance of a true pose from a stamp, s: twice the usual interval; anything farther is a gap.
 fn max_difference(truth: &[Pose]) -> f64 {
     let mut intervals: Vec<f64> = truth.windows(2).map(|w| w[1].stamp - w[0].stamp).collect();
     2.0 * median(&mut intervals)
@@ -100,7 +100,7 @@ fn motion(to: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
     to.inverse() * from
 }
 
-/// Index of the value nearest to `wanted`, ascending: the script's own bisection decides ties.
+/// Index of the value nearest to `wanted` in ascending values, by the script's bisection, which decides ties.
 fn nearest(len: usize, value: impl Fn(usize) -> f64, wanted: f64) -> usize {
     let mut best = 0;
     let mut difference = (value(0) - wanted).abs();

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::*;
 use crate::trajectory::read_benchmark;
 
-/// The folder of real trajectories, where there is one.
+/// The folder of real trajectories, if it exists.
 fn real() -> Option<PathBuf> {
     let data = std::env::var_os("KINOISE_DATA").map(PathBuf::from);
     let root = data
@@ -13,7 +13,7 @@ fn real() -> Option<PathBuf> {
     Some(root.join("tum_trajectories")).filter(|p| p.is_dir())
 }
 
-/// Every figure of the scripts themselves, to the digits they print.
+/// Every value that the scripts report, to the digits they print.
 #[test]
 fn the_scripts_figures_to_the_last_digit() {
     let Some(folder) = real() else { return };
@@ -54,7 +54,7 @@ fn path(n: usize) -> Vec<Pose> {
     (0..n).map(|k| Pose { stamp: k as f64 / 30.0, world_from_camera: at(k) }).collect()
 }
 
-/// Neither measure sees where the world's origin is.
+/// Neither measure depends on the origin of the world.
 #[test]
 fn a_moved_world_is_no_error() {
     let truth = path(90);
@@ -70,7 +70,7 @@ fn a_moved_world_is_no_error() {
     assert!(back.translation.vector.norm() < 1e-12 && back.rotation.angle() < 1e-12);
 }
 
-/// A camera that believes it goes 1 % further each second errs by 1 % of the way.
+/// An estimate whose scale is 1 % too large has a relative error of 1 % of the path.
 #[test]
 fn a_wrong_scale_is_measured() {
     let straight = |scale: f64| -> Vec<Pose> {
@@ -85,7 +85,7 @@ fn a_wrong_scale_is_measured() {
     let found = evaluate(&straight(1.0), &straight(1.01), Delta::Seconds(1.0)).unwrap();
     assert!((found.rpe.translation.mean - 0.01).abs() < 1e-12);
     assert!(found.rpe.rotation.max < 1e-9);
-    // Evenly spread over 4 s about the middle: root mean square 0.01 * 4 / sqrt(12), but for ends.
+    // Spread evenly over 4 s about the middle: RMS 0.01 * 4 / sqrt(12), except at the ends.
     assert!((found.ate.error.rmse - 0.01 * 4.0 / 12f64.sqrt()).abs() < 2e-4);
 }
 

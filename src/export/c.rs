@@ -126,7 +126,7 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
     text
 }
 
-/// A function that adds terms up, each a function of its own.
+/// A function that sums terms, each a function of its own.
 fn sum(name: &str, lines: &[Line], arguments: &str) -> String {
     let mut text = String::new();
     for (k, line) in lines.iter().enumerate() {

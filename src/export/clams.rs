@@ -1,22 +1,22 @@
-//! The table of CLAMS: what a stored depth is multiplied by, by block of pixels and distance.
+//! The table of CLAMS: factors on the stored depth, by block of pixels and distance.
 //!
 //! Layout: `DiscreteDepthDistortionModel::serialize` of Teichman, Miller and Thrun's code
-//! (clams/src/discrete_depth_distortion_model.cpp, "v01"), numbers as the machine has them (little
-//! end first), vectors as `eigen_extensions::serialize` writes them.
+//! (clams/src/discrete_depth_distortion_model.cpp, "v01"), numbers in machine byte order (little-endian),
+//! vectors as `eigen_extensions::serialize` writes them.
 
 use super::Exported;
 use super::tables::{Blocks, known, multipliers, notes_of_bias};
 use crate::error::Result;
 use crate::model::NoiseModel;
 
-/// The blocks of CLAMS, px; an image they do not divide has smaller ones.
+/// Block size of CLAMS, px; smaller where it does not divide the image.
 const BLOCK: [usize; 2] = [8, 6];
-/// CLAMS looks no farther, m.
+/// Largest distance of CLAMS, m.
 const FARTHEST_M: f64 = 10.0;
-/// A tenth of what CLAMS takes: it interpolates between the middles of its bins.
+/// Bin size, m: a tenth of CLAMS's own. CLAMS interpolates between the centres of its bins.
 const BIN_M: f64 = 0.2;
 const BINS: usize = 50;
-/// As many examples stand behind each bin; fewer than 50, and CLAMS does not interpolate.
+/// Number of examples claimed for each bin; with fewer than 50, CLAMS does not interpolate.
 const EXAMPLES: f32 = 1000.0;
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
@@ -41,7 +41,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
         bytes.extend(FARTHEST_M.to_le_bytes());
         bytes.extend((BINS as i32).to_le_bytes());
         bytes.extend(BIN_M.to_le_bytes());
-        // Sums over examples of truth squared and of truth times measurement: their ratio counts.
+        // Sums over examples of truth squared and of truth times measurement: only their ratio matters.
         vector(&mut bytes, (0..BINS).map(|_| EXAMPLES));
         vector(&mut bytes, factors.clone().map(|f| EXAMPLES * f));
         vector(&mut bytes, (0..BINS).map(|_| EXAMPLES));
@@ -52,7 +52,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     Ok(Exported { bytes, notes })
 }
 
-/// Bytes a number, rows, columns, numbers.
+/// Writes the bytes per number, rows, columns, then the numbers.
 fn vector(bytes: &mut Vec<u8>, numbers: impl Iterator<Item = f32>) {
     let head = [size_of::<f32>() as i32, BINS as i32, 1];
     bytes.extend(head.iter().flat_map(|n| n.to_le_bytes()));

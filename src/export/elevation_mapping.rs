@@ -9,7 +9,7 @@ use super::tables::even;
 use crate::error::Result;
 use crate::model::{Direction, Form, NoiseModel, SigmaModel};
 
-/// Sizes at which a form that is none of the processor's is fitted, and the fit is checked.
+/// Depths at which a form that the processor lacks is fitted, and the fit is checked.
 const NODES: usize = 201;
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
@@ -48,7 +48,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
         format!("beyond {near:.2} to {far:.2} m points are cut off: there sigma was not measured"),
     ];
     let worst = worst(sigma, theta, &factors);
-    // The exact forms leave rounding alone.
+    // The exact forms differ by rounding alone.
     if worst > 1e-9 {
         notes.push(format!(
             "the form {} is none of the processor's: fitted, off by {:.1} % at most",
@@ -62,7 +62,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     Ok(Exported { bytes: text.into_bytes(), notes })
 }
 
-/// a, b, c, d, e of forms that the processor has at one tilt.
+/// Parameters a to e of a form that the processor has, at one tilt; otherwise `None`.
 fn exact(sigma: &SigmaModel, theta: f64) -> Option<[f64; 5]> {
     let p = &sigma.parameters;
     let tilt = |pole: f64| (theta / (pole - theta)).powi(2);
@@ -79,7 +79,7 @@ fn exact(sigma: &SigmaModel, theta: f64) -> Option<[f64; 5]> {
     Some([a / across, b / across, c, d / across, e])
 }
 
-/// a + b z^2 by least squares of the relative error.
+/// Fits a + b z^2 by least squares of the relative error.
 fn fitted(sigma: &SigmaModel, theta: f64) -> [f64; 5] {
     let mut sums = [0.0; 5];
     for z in even(sigma.domain.z_m, NODES) {
@@ -92,7 +92,7 @@ fn fitted(sigma: &SigmaModel, theta: f64) -> [f64; 5] {
     [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant, 0.0, 0.0, 0.0]
 }
 
-/// The largest relative error of the processor's formula.
+/// Largest relative error of the processor's formula.
 fn worst(sigma: &SigmaModel, theta: f64, [a, b, c, d, e]: &[f64; 5]) -> f64 {
     let off = |z: f64| {
         let processor = a + b * (z - c) * (z - c) + d * z.powf(*e);
@@ -101,7 +101,7 @@ fn worst(sigma: &SigmaModel, theta: f64, [a, b, c, d, e]: &[f64; 5]) -> f64 {
     even(sigma.domain.z_m, NODES).into_iter().map(off).fold(0.0, f64::max)
 }
 
-/// YAML 1.1 reads 1e-5 as text: its floats have a point.
+/// YAML 1.1 reads 1e-5 as text: a float needs a decimal point ...
 fn yaml_float(v: f64) -> String {
     let text = number(v);
     match text.split_once('e') {
@@ -111,7 +111,7 @@ fn yaml_float(v: f64) -> String {
     }
 }
 
-/// And their powers have a sign.
+/// ... and its exponent a sign.
 fn signed(power: &str) -> String {
     if power.starts_with('-') { power.into() } else { format!("+{power}") }
 }

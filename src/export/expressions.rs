@@ -1,7 +1,7 @@
-//! Terms of a model as expressions that Python and C both read: calls, + - * / and numbers.
+//! Terms of a model as expressions valid in both Python and C: calls, + - * / and numbers.
 //!
-//! `p` is the place of a pixel ([`crate::terms::PixelContext`] under shorter names); the functions
-//! that are called stand in `helpers.py` and `helpers.h`.
+//! `p` is the place of a pixel ([`crate::terms::PixelContext`] under shorter names); the functions called
+//! are defined in `helpers.py` and `helpers.h`.
 
 use crate::model::{Form, SigmaModel};
 use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, ROOM_LUX, TABLE, Term};
@@ -35,7 +35,7 @@ pub(super) fn sigma(model: &SigmaModel, prefix: &str) -> String {
     }
 }
 
-/// Expressions, and the tables of numbers that they call for by name.
+/// Writes expressions, and collects the tables of numbers that they refer to by name.
 #[derive(Debug, Clone)]
 pub(super) struct Expressions {
     prefix: &'static str,
@@ -125,7 +125,7 @@ impl Expressions {
         }
     }
 
-    /// A call of a helper with a table, its length, and more.
+    /// Call of a helper with a table, its length and further arguments.
     fn call(&mut self, helper: &str, table: &[f64], tail: Vec<String>) -> String {
         let name = self.name(self.tables.len());
         self.tables.push(table.to_vec());
@@ -134,7 +134,7 @@ impl Expressions {
         format!("{}{helper}({})", self.prefix, all.join(", "))
     }
 
-    /// Bilinear over two axes: what is looked up, from where to where, in how many nodes.
+    /// Bilinear interpolation over two axes, each given by node count, coordinate and range.
     fn grid(&mut self, table: &[f64], axes: [(String, [f64; 2], usize); 2]) -> String {
         let tail = axes.into_iter().flat_map(|(of, [low, high], nodes)| {
             [nodes.to_string(), of, number(low), number(high)]
@@ -192,7 +192,7 @@ fn coordinate(over: Coordinate) -> String {
             format!("pow(p.z / {}, {})", number(unit_m), number(power))
         }
         Coordinate::Disparity => "p.disparity".into(),
-        // Of a calibration board; no term of a sensor has them.
+        // Coordinates on a calibration board; no term of a sensor uses them.
         Coordinate::Right | Coordinate::Down => "0.0".into(),
         Coordinate::TargetRadiusSquared | Coordinate::Edge => "0.0".into(),
         Coordinate::Theta => "p.theta".into(),
@@ -210,7 +210,7 @@ fn coordinate(over: Coordinate) -> String {
         }
         Coordinate::Session => "p.session_s".into(),
         Coordinate::Temperature => "p.temperature_c".into(),
-        // A surface as light as the median.
+        // A surface of median brightness.
         Coordinate::Light => "1.0".into(),
         Coordinate::LogLight => "0.0".into(),
         Coordinate::Ambient(ratio) => {

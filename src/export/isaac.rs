@@ -1,9 +1,9 @@
 //! Isaac Sim's single-view depth sensor, as a USD layer.
 //!
-//! Attributes of `OmniSensorDepthSensorSingleViewAPI` on a RenderProduct: a disparity of baseline and
-//! focal length, rounded to steps of `noiseMean` px after Gaussian noise of `noiseSigma` px, the same
-//! over patches of `noiseDownscaleFactorPixel` (Isaac Sim's `SingleViewDepthSensor`; ovrtx, "Tune
-//! Noise, Quantization and Confidence": a step of zero switches both off).
+//! Attributes of `OmniSensorDepthSensorSingleViewAPI` on a RenderProduct: disparity from baseline and focal
+//! length, with Gaussian noise of `noiseSigma` px, constant over patches of `noiseDownscaleFactorPixel`,
+//! then rounded to steps of `noiseMean` px (Isaac Sim's `SingleViewDepthSensor`; ovrtx, "Tune Noise,
+//! Quantization and Confidence": a step of zero switches both off).
 
 use super::Exported;
 use super::expressions::number;
@@ -15,7 +15,7 @@ use crate::model::NoiseModel;
 use crate::view::Sensor;
 
 const NODES: usize = 201;
-/// Finer than any matcher's, px: where no step is known.
+/// Step where none is known, px: finer than any matcher's.
 const NO_STEP_PX: f64 = 1e-3;
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
@@ -31,7 +31,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     let [near, far] = model.sigma.domain.z_m;
     let theta = model.sigma.domain.theta_rad[0];
     let px = |z: f64| model.sigma.axial_sigma(z, theta) * scale / (z * z);
-    // Evenly in disparity, as a matcher meets them; the steps add their own noise.
+    // Evenly spaced in disparity, as a matcher sees them. The steps add noise of their own.
     let sizes: Vec<f64> =
         even([1.0 / far, 1.0 / near], NODES).iter().map(|q| px(1.0 / q)).collect();
     let mean_square = sizes.iter().map(|s| s * s).sum::<f64>() / sizes.len() as f64;
@@ -80,7 +80,7 @@ fn parameter(model: &NoiseModel, id: &str, name: &str) -> Option<f64> {
     model.effects.iter().find(|e| e.id == id)?.number(name)
 }
 
-/// The step of the disparity: the matcher's where it was found, else the stored number's.
+/// Disparity step: the matcher's where it was found, else that of the stored values.
 fn step_px(model: &NoiseModel, sensor: &Sensor, scale: f64, notes: &mut Vec<String>) -> f64 {
     let found = parameter(model, "disparity-quantisation", "step_px").filter(|step| *step > 0.0);
     match (found, sensor.code) {

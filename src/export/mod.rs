@@ -1,4 +1,4 @@
-//! A model as other software reads it: one format a file, and with each what it cannot hold.
+//! Export of a model to the formats of other software, each with notes on what it cannot hold.
 //!
 //! ```text
 //! model.json -> python, c: the whole model as a program
@@ -28,11 +28,11 @@ use crate::model::NoiseModel;
 #[derive(Debug, Clone)]
 pub struct Exported {
     pub bytes: Vec<u8>,
-    /// What of the model it does not hold, and what was put in its place; sentences.
+    /// Sentences on what of the model the file does not hold, and what replaces it.
     pub notes: Vec<String>,
 }
 
-/// What others read.
+/// Formats that other software reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExportFormat {
     Python,
@@ -46,8 +46,10 @@ pub enum ExportFormat {
     Open3d,
 }
 
-/// `model` as a file of another format.
-/// An error when the format asks for what the model has not: a sensor, a baseline, an image of a certain size.
+/// Converts `model` to a file of another format.
+///
+/// # Errors
+/// When the model lacks what the format needs: a sensor, a baseline, an image of a certain size.
 pub fn export(model: &NoiseModel, format: ExportFormat) -> Result<Exported> {
     match format {
         ExportFormat::Python => python::write(model),

@@ -1,4 +1,4 @@
-//! NumPy's archive of arrays: a zip of .npy files, stored (numpy.lib.format).
+//! NumPy's archive of arrays: an uncompressed zip of .npy files (numpy.lib.format).
 
 use std::io::{Cursor, Write};
 
@@ -11,8 +11,8 @@ use super::tables::{SigmaTable, even, frontal, notes_of_bias};
 use crate::error::{Error, Result};
 use crate::model::NoiseModel;
 
-/// Depths of the correction, evenly in disparity: linear between two, a bowl that grows with the
-/// square of the disparity is met to a hundredth.
+/// Depths of the correction, evenly spaced in disparity: linear interpolation reproduces a bowl that grows
+/// with the square of the disparity to a hundredth.
 const DEPTHS: usize = 9;
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
@@ -60,7 +60,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
 fn array(kind: &str, shape: &[usize], data: Vec<u8>) -> Vec<u8> {
     let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let mut head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({sizes}), }}");
-    // Ten bytes before it, a line's end behind it, and all together a multiple of 64.
+    // Ten bytes precede the header, a newline ends it, and the total is a multiple of 64.
     let padding = 63 - (head.len() + 10) % 64;
     head.push_str(&" ".repeat(padding));
     head.push('\n');
@@ -71,7 +71,7 @@ fn array(kind: &str, shape: &[usize], data: Vec<u8>) -> Vec<u8> {
     file
 }
 
-/// A zip without compression, its bytes whatever the time.
+/// An uncompressed zip whose bytes do not depend on the time.
 struct Archive(ZipWriter<Cursor<Vec<u8>>>);
 
 impl Archive {

@@ -1,8 +1,8 @@
 //! The distortion table of Open3D's `DepthNoiseSimulator` and of Redwood's simdepth.py.
 //!
-//! Layout: five lines that are skipped, then 80 x 80 rows (8 x 6 px each, row by row) of 23 numbers:
-//! three of the bins, then counts, two sums and the factors of five bins of 2 m. The reader divides a
-//! true depth by the factor, linear between the bins' middles at 1, 3, 5, 7 and 9 m
+//! Layout: five skipped lines, then 80 x 80 rows (8 x 6 px each, row by row) of 23 numbers: three that
+//! describe the bins, then counts, two sums and the factors of five bins of 2 m. The reader divides a true
+//! depth by the factor, interpolated linearly between the bin centres at 1, 3, 5, 7 and 9 m
 //! (cpp/open3d/t/io/ImageIO.cpp; <http://redwood-data.org/indoor/data/simdepth.py>).
 
 use std::fmt::Write as _;
@@ -17,10 +17,9 @@ const BLOCK: [usize; 2] = [8, 6];
 const BLOCKS: usize = 80;
 const BINS: usize = 5;
 const BIN_M: f64 = 2.0;
-/// A block with fewer in every bin counts as never seen.
+/// Number of examples claimed for each bin; a block with fewer in every bin counts as never seen.
 const EXAMPLES: f64 = 8000.0;
-/// Of the search for the depth that is stored: the error shrinks by the bias's steepness, a tenth, a
-/// round.
+/// Iterations of the search for the stored depth; each shrinks the error by the bias's slope, a tenth.
 const ROUNDS: usize = 12;
 
 pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
@@ -51,7 +50,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
             let of = |bin: &Vec<f64>| if inside { bin[y * across + x] } else { 1.0 };
             let factors: Vec<f64> = bins.iter().map(of).collect();
             let examples = vec![EXAMPLES; BINS];
-            // Sums over examples of truth squared and of truth times measurement: their ratio counts.
+            // Sums over examples of truth squared and of truth times measurement: only their ratio matters.
             let sums = factors.iter().map(|f| EXAMPLES * f).collect();
             let _ = write!(text, "10 {BINS} {BIN_M}");
             for number in [examples.clone(), sums, examples, factors].concat() {
@@ -65,7 +64,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     Ok(Exported { bytes: text.into_bytes(), notes })
 }
 
-/// True over stored depth of frontal surfaces at a true depth, by block.
+/// Ratio of true to stored depth of frontal surfaces at a true depth, by block.
 fn factors(correction: &Correction, blocks: &Blocks, true_m: f64) -> Result<Vec<f64>> {
     let pixels = blocks.size[0] * blocks.size[1];
     let mut stored = vec![true_m; pixels];

@@ -7,7 +7,7 @@ use super::tables::{Blocks, SigmaTable, even, known, multipliers, notes_of_bias}
 use crate::error::Result;
 use crate::model::NoiseModel;
 
-/// Blocks of the correction, px: text would be long pixel by pixel.
+/// Block size of the correction, px: pixel by pixel the text would be long.
 const BLOCK: [usize; 2] = [16, 16];
 const DEPTHS: usize = 9;
 
@@ -55,7 +55,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
 }
 
 fn matrix(name: &str, [rows, cols]: [usize; 2], data: &[f64]) -> String {
-    // OpenCV wants what goes on under a key deeper than the key.
+    // OpenCV requires continuation lines to be indented deeper than their key.
     let data = listed(data).replace("\n", "\n    ");
     format!(
         "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: [ {data} ]\n"

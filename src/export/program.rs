@@ -1,4 +1,4 @@
-//! What a program outside needs of a model: one list of terms, written once for each language.
+//! What exported programs need of a model: one list of terms, written once for each language.
 
 use super::expressions::{Expressions, number, sigma};
 use crate::correct::{Correction, LearntTerm};
@@ -7,10 +7,10 @@ use crate::model::NoiseModel;
 use crate::terms::Term;
 use crate::view::Sensor;
 
-/// A term of the program: its expression, and when it is taken.
+/// A term of the program: its expression, and when it applies.
 pub(super) struct Line {
     pub expression: String,
-    /// Disparities beyond which the place is held, px.
+    /// Disparity range to which the place is clamped, px.
     pub held: Option<[f64; 2]>,
     pub asks_temperature: bool,
 }
@@ -25,7 +25,7 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Of a model whose sensor is known where `correction` is given; names begin with `prefix`.
+    /// Program of a model; `correction` is given where its sensor is known. Names begin with `prefix`.
     pub fn of(model: &NoiseModel, correction: Option<&Correction>, prefix: &'static str) -> Self {
         let mut expressions = Expressions::new(prefix);
         let mut line = |term: &Term, [low, high]: [f64; 2]| {
@@ -46,14 +46,14 @@ impl Program {
     }
 }
 
-/// The sensor of a model, and what it takes out of its depth; nothing for a model of a bare table.
+/// The sensor of a model and its correction; `None` for a model of a bare table.
 pub(super) fn correction_of(model: &NoiseModel) -> Result<Option<(Sensor, Correction)>> {
     let Some(sensor) = model.described_sensor()? else { return Ok(None) };
     let correction = Correction::of(model, &sensor)?;
     Ok(Some((sensor, correction)))
 }
 
-/// A list of numbers, a few a line.
+/// A list of numbers, a few per line.
 pub(super) fn listed(numbers: &[f64]) -> String {
     const A_LINE: usize = 6;
     let lines: Vec<String> = numbers
@@ -63,14 +63,14 @@ pub(super) fn listed(numbers: &[f64]) -> String {
     lines.join(",\n    ")
 }
 
-/// Ids, each once.
+/// The ids without duplicates.
 pub(super) fn once<'a>(ids: impl Iterator<Item = &'a str>) -> String {
     let mut known: Vec<&str> = Vec::new();
     ids.for_each(|id| known.extend((!known.contains(&id)).then_some(id)));
     known.join(", ")
 }
 
-/// What programs leave out of a model, told when they are written.
+/// Notes on what programs leave out of a model.
 pub(super) fn left_out(model: &NoiseModel, correction: Option<&Correction>) -> Vec<String> {
     let mut told = Vec::new();
     match correction {

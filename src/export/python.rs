@@ -1,4 +1,4 @@
-//! A Python file that needs numpy alone: `sigma()`, `correct()`, `sigma_image()`, `sample()`.
+//! A Python file that needs only numpy: `sigma()`, `correct()`, `sigma_image()`, `sample()`.
 
 use std::fmt::Write as _;
 
@@ -111,7 +111,7 @@ fn constants(sensor: &Sensor, correction: &Correction) -> String {
     text
 }
 
-/// A list of functions with whether they ask for the temperature.
+/// A list of functions, each with whether it needs the temperature.
 fn terms(name: &str, lines: &[Line]) -> String {
     let mut text = format!("{PREFIX}{name}_terms = [\n");
     for Line { expression, held, asks_temperature } in lines {

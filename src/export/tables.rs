@@ -6,10 +6,11 @@ use crate::error::{Error, Result};
 use crate::model::{Domain, NoiseModel};
 use crate::view::Sensor;
 
-/// Nodes over depth and over tilt: linear between them, Eq. 1 is met to a thousandth but near its pole.
+/// Nodes over depth and over tilt: linear interpolation reproduces Eq. 1 to a thousandth, except near its
+/// pole.
 const NODES: usize = 61;
 
-/// Sigma at even nodes, tilt by tilt within a depth.
+/// Sigma at evenly spaced nodes; tilt varies fastest.
 pub(super) struct SigmaTable {
     pub z_m: Vec<f64>,
     pub theta_rad: Vec<f64>,
@@ -27,7 +28,7 @@ impl SigmaTable {
     }
 }
 
-/// So many numbers from the first to the last.
+/// `nodes` evenly spaced numbers from `low` to `high`.
 pub(super) fn even([low, high]: [f64; 2], nodes: usize) -> Vec<f64> {
     let last = (nodes - 1) as f64;
     let at = |k: usize| if k + 1 == nodes { high } else { low + (high - low) * k as f64 / last };
@@ -48,7 +49,7 @@ pub(super) fn frontal(correction: &Correction, depth_m: f64) -> Result<Vec<f64>>
     correction.corrected(&picture, &Conditions::default())
 }
 
-/// What tables of [`frontal`] leave out, told where it matters.
+/// Notes on what tables of [`frontal`] leave out, where it matters.
 pub(super) fn notes_of_bias(correction: &Correction) -> Vec<String> {
     let Correction { needs, drifts, .. } = correction;
     let mut notes = Vec::new();
@@ -69,7 +70,7 @@ pub(super) fn notes_of_bias(correction: &Correction) -> Vec<String> {
 /// Blocks of pixels a picture is divided into.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Blocks {
-    /// Of the picture and of a block, px.
+    /// Size of the picture and of a block, px.
     pub size: [usize; 2],
     pub block: [usize; 2],
 }
@@ -94,7 +95,7 @@ impl Blocks {
     }
 }
 
-/// True over stored depth of every block of a picture that shows `depth_m` throughout; 1 where the
+/// Ratio of true to stored depth of every block of a picture that shows `depth_m` throughout; 1 where the
 /// biases leave no depth.
 pub(super) fn multipliers(
     correction: &Correction,

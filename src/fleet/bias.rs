@@ -1,7 +1,6 @@
-//! The bias of depth over the picture, as a model's fitted shapes add up to it.
+//! The bias of depth over the picture as the sum of a model's fitted shapes.
 //!
-//! How a bias is split among causes differs from one diagnosis to the next; the sum in metres is
-//! what was measured.
+//! Diagnoses differ in how they split a bias among causes; only the sum in metres was measured.
 
 use std::collections::BTreeMap;
 
@@ -23,11 +22,11 @@ pub struct SharedBias {
     pub distances: Vec<SharedDistance>,
 }
 
-/// Bias of depth over the picture, root mean squares.
+/// Bias of depth over the picture, as RMS.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SharedDistance {
     pub z_m: f64,
-    /// Of the units' mean, and of their scatter about it, without what the errors make of either.
+    /// RMS of the units' mean and of their scatter about it, both minus the contribution of the errors.
     pub common_rms_m: f64,
     pub scatter_rms_m: f64,
     pub units: Vec<BiasOfUnit>,
@@ -38,20 +37,21 @@ pub struct BiasOfUnit {
     pub unit: String,
     pub rms_m: f64,
     pub error_rms_m: f64,
-    /// From the mean of the others that share a bias, without what the errors make of it.
+    /// RMS of the difference from the mean of the other units that share a bias, minus the contribution of
+    /// the errors.
     pub departure_rms_m: f64,
 }
 
-/// Columns and rows of pixels at which the bias is compared.
+/// Columns and rows of the pixels at which the bias is compared.
 const GRID: [usize; 2] = [9, 7];
 const PIXELS: usize = GRID[0] * GRID[1];
-/// What grows with the disparity has two parts at most, a level and a square.
+/// Number of distances. A bias depends on the disparity by at most two parts, a constant and a square.
 const DISTANCES: usize = 3;
 
-/// The errors come from a fit to all pixels of all views.
+/// Degrees of freedom: practically infinite, because the fit uses all pixels of all views.
 const EXACT: f64 = 1e9;
 
-/// Effects with a bias that can be compared; or why there are none.
+/// Effects whose bias can be compared, or the reason why there are none.
 pub(super) fn shapes(model: &NoiseModel) -> Result<Vec<&Effect>, String> {
     let is_bias = |e: &&Effect| e.shape.iter().any(usable);
     let found: Vec<&Effect> = model.effects.iter().filter(is_bias).collect();
@@ -68,21 +68,20 @@ pub(super) fn shapes(model: &NoiseModel) -> Result<Vec<&Effect>, String> {
     }
 }
 
-/// Of the sensor, the same in every session and on any surface.
+/// Whether the term is a bias of the sensor that is the same in every session and on any surface.
 fn usable(term: &Term) -> bool {
     let needs = term.needs();
     term.is_sensor_bias() && !needs.light && !needs.temperature && !needs.session
 }
 
-/// Depth times disparity, px m.
+/// The camera, and depth times disparity, px m.
 fn scale(model: &NoiseModel) -> Option<(Camera, f64)> {
     let sensor = model.sensor.as_ref()?;
     let baseline = sensor.baseline_m.unwrap_or(KINECT_BASELINE_M);
     Some((sensor.camera.clone(), sensor.camera.fx * baseline))
 }
 
-/// Distances at which all of the models have learnt their biases, near to far; none where they
-/// have nothing in common.
+/// Distances at which all models have learnt their biases, near to far; empty if they have none in common.
 pub(super) fn distances(models: &[&NoiseModel]) -> Vec<f64> {
     let [mut near, mut far] = [0.0, f64::INFINITY];
     for model in models {
@@ -106,8 +105,8 @@ pub(super) fn distances(models: &[&NoiseModel]) -> Vec<f64> {
     all
 }
 
-/// The bias of depth, m, over the picture at each distance, of a wall faced squarely, without the
-/// part that is affine in the picture: planes cannot show that.
+/// The bias of depth over the picture at each distance, m, for a frontal wall. The part that is affine in the
+/// ray is removed, because planes cannot show it.
 pub(super) fn curve(model: &NoiseModel, effects: &[&Effect], distances: &[f64]) -> Option<Curve> {
     let (camera, scale) = scale(model)?;
     let rays = camera.rays();
@@ -133,7 +132,7 @@ pub(super) fn curve(model: &NoiseModel, effects: &[&Effect], distances: &[f64]) 
                     let place = wall(&pixels, i, z);
                     row.fill(0.0);
                     term.basis.fill(&place, &mut row);
-                    // More disparity is less depth.
+                    // A larger disparity is a smaller depth.
                     let depth = -z * z / scale;
                     row.iter().enumerate().for_each(|(j, v)| block[(k, j)] = depth * v);
                 }
@@ -149,11 +148,11 @@ pub(super) fn curve(model: &NoiseModel, effects: &[&Effect], distances: &[f64]) 
     Some(Curve { values: sum.values, covariance, degrees_of_freedom: EXACT })
 }
 
-/// All terms so far.
+/// Sum of the terms so far.
 struct Sum {
     values: DVector<f64>,
     own: DMatrix<f64>,
-    /// What errs together, by its fit and its number there.
+    /// Correlated factors, by fit and number within the fit.
     parts: BTreeMap<(u32, usize), DVector<f64>>,
 }
 
@@ -185,7 +184,7 @@ impl Sum {
     }
 }
 
-/// Pixels in the middle of equal fields of the picture.
+/// Pixels at the centres of equal fields of the picture.
 fn grid(camera: &Camera) -> Vec<usize> {
     let middle = |k: usize, fields: usize, size: usize| (2 * k + 1) * size / (2 * fields);
     let [across, down] = GRID;
@@ -198,7 +197,7 @@ fn grid(camera: &Camera) -> Vec<usize> {
         .collect()
 }
 
-/// A pixel that sees a wall at this distance, faced squarely, m.
+/// A pixel that sees a frontal wall at distance `z`, m.
 fn wall(pixels: &Pixels<'_>, i: usize, z: f64) -> PixelContext {
     let mut place = pixels.place(i);
     place.at_disparity(pixels.scale_px_m / z, pixels.scale_px_m);
@@ -206,21 +205,21 @@ fn wall(pixels: &Pixels<'_>, i: usize, z: f64) -> PixelContext {
     place
 }
 
-/// Projector that takes the part affine in the ray out of values on these rays.
+/// Projection that removes the part affine in the ray from values on these rays.
 fn without_plane(rays: &[(f64, f64)]) -> Option<DMatrix<f64>> {
     let x = DMatrix::from_fn(rays.len(), 3, |i, j| [1.0, rays[i].0, rays[i].1][j]);
     let inverse = (x.transpose() * &x).try_inverse()?;
     Some(DMatrix::identity(rays.len(), rays.len()) - &x * inverse * x.transpose())
 }
 
-/// Units whose bias can be compared.
+/// Units whose biases can be compared.
 pub(super) struct Comparable {
     units: Vec<String>,
     curves: Vec<Curve>,
     distances: Vec<f64>,
 }
 
-/// Two or more of them; the others are remarked.
+/// The comparable units, at least two; the others get remarks.
 pub(super) fn comparable(
     newest: &[(String, &UnitModel)],
     remarks: &mut Vec<String>,
@@ -289,7 +288,7 @@ pub(super) fn shared(
     Some(SharedBias { standings, distances })
 }
 
-/// Mean square over the picture at the `d`-th distance: of the values, and of their errors.
+/// Mean squares over the picture at the `d`-th distance: of the values and of their errors.
 pub(super) fn mean_squares(curve: &Curve, d: usize) -> [f64; 2] {
     let span = d * PIXELS..(d + 1) * PIXELS;
     let mean = |of: &dyn Fn(usize) -> f64| span.clone().map(of).sum::<f64>() / PIXELS as f64;

@@ -1,4 +1,4 @@
-//! Has a unit changed? Two models of the same serial number, made at two dates.
+//! Detects changes of a unit from models of the same serial number made at different dates.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use super::unit::UnitModel;
 use crate::error::Result;
 use crate::stats::student_quantile;
 
-/// An older model of a unit beside its newest.
+/// An older model of a unit compared with its newest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
     pub unit: String,
@@ -23,7 +23,7 @@ pub struct Change {
     pub sigma: ChangeOfSigma,
     /// Null where one of the models holds no measured bias.
     pub bias: Option<ChangeOfBias>,
-    /// Ids of effects in the newest model only, and in the older only.
+    /// Ids of effects only in the newest model, and only in the older one.
     pub found_now: Vec<String>,
     pub found_then: Vec<String>,
 }
@@ -31,7 +31,7 @@ pub struct Change {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangeOfSigma {
     pub changed: bool,
-    /// Times the number of tests of changes.
+    /// p-value times the number of tests for changes.
     pub p_adjusted: f64,
     pub places: Vec<SigmaThenAndNow>,
 }
@@ -43,7 +43,7 @@ pub struct SigmaThenAndNow {
     pub from_m: f64,
     pub to_m: f64,
     pub change_m: f64,
-    /// 95 %, at this place by itself.
+    /// 95 % interval at this place alone.
     pub interval_m: [f64; 2],
 }
 
@@ -57,12 +57,12 @@ pub struct ChangeOfBias {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BiasThenAndNow {
     pub z_m: f64,
-    /// Root mean square over the picture, with what the errors alone would give taken out.
+    /// RMS over the picture, minus what the errors alone would give.
     pub change_rms_m: f64,
     pub error_rms_m: f64,
 }
 
-/// Every older model against the newest; `groups` hold the models of a unit in order of time.
+/// Compares every older model with the newest; `groups` hold the models of a unit in order of time.
 pub(super) fn changes(groups: &[(String, Vec<&UnitModel>)]) -> Result<Vec<Change>> {
     let mut changes = Vec::new();
     for (unit, models) in groups {
@@ -117,7 +117,7 @@ fn change_of_sigma(from: &UnitModel, to: &UnitModel) -> Result<ChangeOfSigma> {
         let interval_m = [change_m - reach * error, change_m + reach * error];
         SigmaThenAndNow { z_m, theta_rad, from_m, to_m, change_m, interval_m }
     };
-    // Errors are known: models without were refused.
+    // The errors are known: models without them were refused.
     let p_adjusted = same(&[&then, &now]).unwrap_or(1.0);
     Ok(ChangeOfSigma {
         changed: false,

@@ -1,15 +1,15 @@
-//! A unit's values at the places where units are compared, and whether several units share them.
+//! A unit's values at the places where units are compared, and the test whether several units share them.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::stats::f_upper;
 
-/// Values at places that all units have in common, with what is known of their errors.
+/// Values at places that all units have in common, with the covariance of their errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     pub values: DVector<f64>,
     pub covariance: DMatrix<f64>,
-    /// Of the covariance, which is an estimate too.
+    /// Degrees of freedom of the covariance, which is an estimate too.
     pub degrees_of_freedom: f64,
 }
 
@@ -20,8 +20,8 @@ impl Curve {
 
     /// Variance of the error at a place.
     ///
-    /// That of Student's t with the covariance's degrees of freedom n, which is the estimate times
-    /// n / (n - 2) (JCGM 101:2008, 6.4.9).
+    /// This is the variance of Student's t with the covariance's degrees of freedom n, n / (n - 2) times the
+    /// estimate (JCGM 101:2008, 6.4.9).
     pub fn variance(&self, place: usize) -> f64 {
         let n = self.degrees_of_freedom;
         self.covariance[(place, place)] * n / (n - 2.0)
@@ -31,7 +31,7 @@ impl Curve {
         self.covariance[(place, place)].max(0.0).sqrt()
     }
 
-    /// `self` minus another unit's, which errs by itself.
+    /// Difference from another unit's curve, whose errors are independent.
     pub fn minus(&self, other: &Curve) -> Curve {
         let parts = [self.covariance.trace(), other.covariance.trace()];
         Curve {
@@ -44,8 +44,8 @@ impl Curve {
         }
     }
 
-    /// The mean of several, the surer ones weighing more. The weight is one number a unit, so that
-    /// the mean is again a curve of the same kind.
+    /// Weighted mean of several curves; more certain ones weigh more. There is one weight per unit, so that
+    /// the mean is a curve of the same kind.
     pub fn mean(curves: &[&Curve]) -> Option<Curve> {
         let unit = pooled(curves)?;
         let spread: Vec<f64> = curves.iter().map(|c| c.relative_variance(&unit)).collect();
@@ -62,7 +62,7 @@ impl Curve {
         Some(Curve { values, covariance, degrees_of_freedom: satterthwaite(parts) })
     }
 
-    /// Mean variance over the places, each in units of the pooled one.
+    /// Mean over the places of the variance relative to the pooled one.
     fn relative_variance(&self, pooled: &[f64]) -> f64 {
         let n = self.len() as f64;
         let share = |(p, v): (usize, &f64)| self.covariance[(p, p)] / v;
@@ -70,7 +70,7 @@ impl Curve {
     }
 }
 
-/// Degrees of freedom of a sum of variances that are estimates (Satterthwaite 1946).
+/// Degrees of freedom of a sum of estimated variances (Satterthwaite 1946).
 fn satterthwaite(parts: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     let (sum, squares) = parts
         .into_iter()
@@ -78,7 +78,7 @@ fn satterthwaite(parts: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     sum * sum / squares
 }
 
-/// The units' mean variance at each place; `None` where one is not positive.
+/// Mean variance of the units at each place; `None` if one is not positive.
 fn pooled(curves: &[&Curve]) -> Option<Vec<f64>> {
     let n = curves.first()?.len();
     let k = curves.len() as f64;
@@ -87,14 +87,13 @@ fn pooled(curves: &[&Curve]) -> Option<Vec<f64>> {
     all.iter().all(|v| v.is_finite() && *v > 0.0).then_some(all)
 }
 
-/// Chance of curves that differ by as much or more where the units are the same; `None` where an
-/// error is not known.
+/// p-value of the hypothesis that all curves are the same; `None` where an error is unknown.
 ///
-/// The statistic is the sum of the squared deviations from the plain mean, each in units of the
-/// pooled error there. Its numerator is matched by its first two moments (Box 1954) and its
-/// denominator's degrees of freedom are Satterthwaite's: Brown and Forsythe's (1974) comparison of
-/// means under unequal variances with Mehrotra's (1997) numerator, over several places at once. It
-/// needs no inverse of a covariance, which has hardly as many free parameters as there are places.
+/// The statistic is the sum of the squared deviations from the unweighted mean, each relative to the pooled
+/// error at its place. Its numerator is matched by its first two moments (Box 1954), and its denominator has
+/// Satterthwaite's degrees of freedom. This is Brown and Forsythe's (1974) comparison of means under unequal
+/// variances with Mehrotra's (1997) numerator, over several places at once. It needs no inverse of a
+/// covariance, which has hardly as many free parameters as there are places.
 pub fn same(curves: &[&Curve]) -> Option<f64> {
     let k = curves.len() as f64;
     if curves.len() < 2 {
@@ -138,7 +137,7 @@ mod tests {
 
     const PLACES: usize = 6;
 
-    /// Strongly correlated, as a form with few parameters makes them.
+    /// Strongly correlated, as for a form with few parameters.
     fn covariance() -> DMatrix<f64> {
         DMatrix::from_fn(PLACES, PLACES, |i, j| {
             let apart = i.abs_diff(j) as f64;
@@ -159,7 +158,7 @@ mod tests {
         (0..units).map(|_| one()).collect()
     }
 
-    /// How often curves of the same unit are called different at 1 %.
+    /// Number of runs in which curves of the same unit are called different at 1 %.
     fn alarms(units: usize, dof: f64, runs: usize) -> usize {
         let alarm = |seed: &usize| {
             let curves = draw(units, dof, *seed as u64);
@@ -168,9 +167,9 @@ mod tests {
         (0..runs).filter(alarm).count()
     }
 
-    /// False alarms at 1 % over 4,000 draws, from few degrees of freedom to exact errors. The
-    /// moments' match is good to a factor of two in this tail, to either side: the bounds are a
-    /// binomial's at half and twice the level, with 1 in 1,000 either side.
+    /// False alarms at 1 % over 4,000 draws, from few degrees of freedom to exact errors. The moment matching
+    /// is good to a factor of two in this tail, in both directions: the bounds are a binomial's at half and
+    /// twice the level, with 1 in 1,000 on each side.
     #[test]
     fn unchanged_curves_raise_false_alarms_at_their_level() {
         for (units, dof) in [(2, 6.0), (2, 30.0), (5, 12.0), (10, 1e6)] {

@@ -1,16 +1,17 @@
-//! Several units of a kind: what they have in common, what is one unit's own, and whether a unit has
-//! changed since.
+//! Compares several units of a kind: what they share, what is specific to one unit, and whether a unit has
+//! changed.
 //!
-//! Two things are compared, each with the covariance that the models carry: sigma along the
-//! optical axis at distances and tilts that all units have measured, and the bias of depth over the
-//! picture. Coefficients are not: they are correlated, and different ones make the same curve.
+//! Two quantities are compared, each with the covariance in the models: sigma along the optical axis at
+//! distances and tilts that all units have measured, and the bias of depth over the picture. Coefficients are
+//! not compared: they are correlated, and different ones give the same curve.
 //!
-//! - *In common*: a random-effects mean and the scatter between units ([`crate::stats::RandomEffects`]).
-//! - *One's own*: units that differ from the others' mean by more than the errors, taken out one by
-//!   one (`own`).
-//! - *Changed since*: an older model of the same serial number against its newest (`change`).
+//! - *Shared*: a random-effects mean and the scatter between units ([`crate::stats::RandomEffects`]).
+//! - *Specific*: units that differ from the others' mean by more than the errors, removed one at a time
+//!   (`own`).
+//! - *Changed*: an older model of the same serial number against its newest (`change`).
 //!
-//! Each question raises a false alarm in one run of a hundred at most ([`LEVEL`]), however many units.
+//! Each question raises a false alarm in at most one run in a hundred ([`LEVEL`]), whatever the number of
+//! units.
 
 mod bias;
 mod change;
@@ -35,18 +36,18 @@ pub use unit::UnitModel;
 
 pub const FORMAT: &str = "kinoise-units/1";
 
-/// What came out.
+/// Result of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     pub format: &'static str,
     pub sensor: String,
     pub width: usize,
     pub height: usize,
-    /// Of the tests: the chance of a false alarm in one question.
+    /// Significance level: the false-alarm probability of one question.
     pub level: f64,
-    /// Each with its newest model.
+    /// The units, each with its newest model.
     pub units: Vec<Unit>,
-    /// Null where there is one unit only.
+    /// Null for a single unit.
     pub sigma: Option<SharedSigma>,
     /// Null where fewer than two units hold a measured bias.
     pub bias: Option<SharedBias>,
@@ -67,8 +68,8 @@ pub struct Unit {
 /// A unit's models in order of time.
 type Group<'a> = (String, Vec<&'a UnitModel>);
 
-/// Compare them: two models at least, of one kind of sensor.
-/// An error when they cannot be compared: too few, of several kinds, without errors, of the same frames, or
+/// Compares at least two models of one kind of sensor.
+/// Fails if they cannot be compared: too few, of several kinds, without errors, of the same frames, or
 /// measured at distances that have nothing in common.
 pub fn compare(models: &[UnitModel]) -> Result<Comparison> {
     let mut remarks = unit::check(models)?;
@@ -109,8 +110,8 @@ fn describe((name, unit): &(String, &UnitModel)) -> Unit {
     }
 }
 
-/// By serial number; models without one stand for themselves. Names are told apart by the file
-/// where two would be the same.
+/// Groups models by serial number; a model without one is its own group. Where two names would be the same,
+/// the file's path is used.
 fn group<'a>(models: &'a [UnitModel], remarks: &mut Vec<String>) -> Vec<Group<'a>> {
     let mut groups: Vec<Group<'a>> = Vec::new();
     for unit in models {

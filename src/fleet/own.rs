@@ -1,32 +1,32 @@
-//! Which units share a curve, and which have one of their own.
+//! Sorts units into those that share a curve and those with their own.
 
 use serde::Serialize;
 
 use super::curve::{Curve, same};
 
-/// Chance that one comparison of units that are all the same says otherwise anywhere.
+/// Probability that one comparison of identical units raises any false alarm.
 pub const LEVEL: f64 = 0.01;
 
-/// Whether a unit shares what the others have in common.
+/// Whether a unit shares the common curve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
     pub unit: String,
-    /// It differs from the others by more than the errors explain.
+    /// The unit differs from the others by more than the errors explain.
     pub is_own: bool,
-    /// Times the number of tests of this question.
+    /// p-value times the number of tests of this question.
     pub p_adjusted: f64,
 }
 
-/// The units apart from the core one after the other, the clearest first: so a unit that differs does
-/// not pull the mean that the next is held against. At the first step the chance of a false alarm is
-/// `LEVEL` over `statistics`, and later steps are taken only when it was none. Each with how far it is
-/// from the mean of the others of the core; of all others where there is no core.
+/// Removes units from the core one at a time, the most significant first, so that a deviating unit does not
+/// bias the mean that the next is compared with. The first step has a false-alarm probability of `LEVEL` over
+/// `statistics`; later steps follow only after a detection. Also returns each unit's difference from the mean
+/// of the other units of the core, or of all others if there is no core.
 pub(super) fn sort_out<'a>(
     names: impl Iterator<Item = &'a String>,
     curves: &[Curve],
     statistics: usize,
 ) -> Option<(Vec<Standing>, Vec<Curve>)> {
-    // Two units are one comparison.
+    // Two units make one comparison.
     let of_units = if curves.len() == 2 { 1 } else { curves.len() };
     let tests = (of_units * statistics) as f64;
     let all: Vec<usize> = (0..curves.len()).collect();
@@ -40,7 +40,7 @@ pub(super) fn sort_out<'a>(
         }
         core.retain(|i| *i != clearest);
     }
-    // Of two that differ nobody knows which is the odd one.
+    // If two units differ, it is unknown which is the odd one.
     if let [a, b] = core[..]
         && same(&[&curves[a], &curves[b]])? * tests < LEVEL
     {
@@ -54,7 +54,7 @@ pub(super) fn sort_out<'a>(
     names.enumerate().map(one).collect()
 }
 
-/// Chance of unit `i` being as far from the mean of these units without it, and how far it is.
+/// p-value of unit `i` against the mean of the other `units`, and its difference from that mean.
 fn against(curves: &[Curve], units: &[usize], i: usize) -> Option<(f64, Curve)> {
     let others: Vec<&Curve> = units.iter().filter(|j| **j != i).map(|j| &curves[*j]).collect();
     let mean = Curve::mean(&others)?;

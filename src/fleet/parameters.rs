@@ -1,7 +1,7 @@
-//! Effects of the units' models by id: who has them, and the parameters that describe them.
+//! Effects of the units' models by id: which units have them, and their parameters.
 //!
-//! They describe and decide nothing: diagnoses split the same bias differently among causes, so
-//! that parameters scatter more than their errors say where the sum in metres does not.
+//! They are descriptive only. Diagnoses split the same bias differently among causes, so parameters scatter
+//! by more than their errors even where the sum in metres does not.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -16,7 +16,7 @@ use crate::stats::RandomEffects;
 pub struct SharedEffect {
     pub id: String,
     pub found_in: Vec<String>,
-    /// Not found there, which does not prove that it is not there.
+    /// Units where it was not found, which does not prove its absence.
     pub not_found_in: Vec<String>,
     pub parameters: Vec<SharedParameter>,
 }
@@ -26,9 +26,9 @@ pub struct SharedParameter {
     pub name: String,
     pub unit: &'static str,
     pub units: Vec<ParameterOfUnit>,
-    /// Of the units that say how sure they are; null where fewer than two do.
+    /// Over the units that state an error; null where fewer than two do.
     pub random_effects: Option<RandomEffects>,
-    /// Chance of scattering as much where all units have the same value, by the stated errors.
+    /// p-value of the hypothesis that all units have the same value, by the stated errors.
     pub p_same: Option<f64>,
 }
 
@@ -36,11 +36,11 @@ pub struct SharedParameter {
 pub struct ParameterOfUnit {
     pub unit: String,
     pub value: f64,
-    /// Null where the model does not say.
+    /// Null where the model states none.
     pub std_error: Option<f64>,
 }
 
-/// By id, over units with their names; what has no name is left to the bias as a whole.
+/// Effects by id over the named units; unexplained ones are left to the bias as a whole.
 pub(super) fn shared(units: &[(String, &[Effect])]) -> Vec<SharedEffect> {
     let mut ids: Vec<&str> = Vec::new();
     for effect in units.iter().flat_map(|(_, effects)| effects.iter()) {
@@ -89,7 +89,7 @@ fn unit_of(id: &str, parameter: &str) -> &'static str {
 
 fn weigh(parameter: &mut SharedParameter) {
     let known = parameter.units.iter().filter_map(|u| Some((u.value, u.std_error?.powi(2))));
-    // An error of zero is a value that was not fitted.
+    // A zero error marks a value that was not fitted.
     let known: Vec<(f64, f64)> = known.filter(|(_, v)| *v > 0.0).collect();
     parameter.random_effects = RandomEffects::of(&known);
     let curves: Vec<Curve> =
@@ -97,7 +97,8 @@ fn weigh(parameter: &mut SharedParameter) {
     parameter.p_same = same(&curves.iter().collect::<Vec<_>>());
 }
 
-/// The fits have thousands of samples; no model says how many degrees of freedom its effects have.
+/// A curve with a single value. The fits have thousands of samples, and no model states the degrees of
+/// freedom of its effects.
 fn single(value: f64, variance: f64) -> Curve {
     Curve {
         values: DVector::from_element(1, value),

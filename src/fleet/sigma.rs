@@ -1,4 +1,4 @@
-//! Sigma of several models at places that all of them have measured.
+//! Compares sigma of several models at places that all of them have measured.
 
 use nalgebra::DVector;
 use serde::Serialize;
@@ -34,7 +34,8 @@ pub struct SigmaOfUnit {
     pub unit: String,
     pub sigma_m: f64,
     pub std_error_m: f64,
-    /// Relative, from the mean of the others that share a curve; with its 95 % interval here alone.
+    /// Relative to the mean of the other units that share a curve, with its 95 % interval at this place
+    /// alone.
     pub departure: f64,
     pub departure_interval: [f64; 2],
 }
@@ -42,12 +43,12 @@ pub struct SigmaOfUnit {
 /// A distance, m, and a tilt, rad.
 pub(super) type Place = (f64, f64);
 
-/// Distances faced as squarely as all models allow: a form has no more than three parameters along z.
+/// Number of distances, at the smallest common tilt: a form has at most three parameters along z.
 const DISTANCES: usize = 4;
-/// Below this the tilt makes no difference that a form could show: 10 degrees.
+/// Smallest range of tilts over which a form could show a difference, 10 degrees.
 const MIN_TILT_RANGE_RAD: f64 = 0.17;
 
-/// Distances from near to far in equal ratios, and two tilts at the middle one.
+/// Distances from near to far in equal ratios, and two tilts at the middle distance.
 pub(super) fn places(units: &[&UnitModel]) -> Result<Vec<Place>> {
     let [near, far] = overlap(units, "distances", "m", |s| s.domain.z_m)?;
     let [square, steep] = overlap(units, "tilts", "rad", |s| s.domain.theta_rad)?;
@@ -62,7 +63,7 @@ pub(super) fn places(units: &[&UnitModel]) -> Result<Vec<Place>> {
     Ok(all)
 }
 
-/// What all models have measured of a range.
+/// Range that all models have measured.
 fn overlap(
     units: &[&UnitModel],
     what: &str,
@@ -97,7 +98,7 @@ pub(super) fn curve(sigma: &SigmaModel, places: &[Place]) -> Curve {
     }
 }
 
-/// The units' newest models side by side; `None` where an error is not known.
+/// Compares the units' newest models; `None` where an error is unknown.
 pub(super) fn shared(
     newest: &[(String, &UnitModel)],
     statistics: usize,

@@ -1,4 +1,4 @@
-//! Models of one kind of sensor: read, named, and refused where they cannot be compared.
+//! Reads and names models of one kind of sensor, and refuses those that cannot be compared.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -8,24 +8,24 @@ use crate::model::NoiseModel;
 use crate::units::counted;
 use crate::view::RecordingFile;
 
-/// A model and the file that it came from.
+/// A model and its file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitModel {
     pub path: PathBuf,
     pub model: NoiseModel,
 }
 
-/// Below three degrees of freedom Student's t has no variance: nothing is known of the errors.
+/// Least degrees of freedom of a sigma: at two or fewer Student's t has no variance, so errors are unknown.
 const MIN_DEGREES_OF_FREEDOM: f64 = 3.0;
 
 impl UnitModel {
-    /// A `model.json`, or the folder that holds one.
+    /// Reads a `model.json`, or the one in a folder.
     pub fn read(path: &Path) -> Result<Self> {
         let file = NoiseModel::file(path);
         Ok(UnitModel { model: NoiseModel::read(&file)?, path: file })
     }
 
-    /// The serial number, or the name of the folder: without a serial nobody knows which unit it is.
+    /// The serial number, or the name of the folder for a unit without one.
     pub fn name(&self) -> String {
         let folder = || Some(self.path.parent()?.file_name()?.to_string_lossy().into_owned());
         let own = || self.path.display().to_string();
@@ -53,7 +53,7 @@ impl UnitModel {
         })
     }
 
-    /// Does it say how sure its sigma is?
+    /// Fails if the uncertainty of sigma is unknown.
     fn check_errors(&self) -> Result<()> {
         let sigma = &self.model.sigma;
         if sigma.covariance.iter().all(|v| *v == 0.0) {
@@ -73,20 +73,20 @@ impl UnitModel {
         Ok(())
     }
 
-    /// What of its recording identifies it, if anything.
+    /// Identification of the recording it was made from, if any.
     fn source(&self) -> Option<String> {
         let hashes = &self.model.provenance.sha256;
         let frames = || Some(hashes.get("frames")?.as_str()?.to_string());
         frames().or_else(|| (!hashes.is_empty()).then(|| format!("{hashes:?}")))
     }
 
-    /// What its sigma is the standard deviation of, in words.
+    /// The kind of standard deviation that its sigma is, in words.
     fn kind_of_sigma(&self) -> Option<&str> {
         self.model.provenance.options.get("sigma")?.as_str()
     }
 }
 
-/// Refuse what cannot be compared; else what is odd.
+/// Fails if the models cannot be compared; otherwise returns remarks.
 pub(super) fn check(units: &[UnitModel]) -> Result<Vec<String>> {
     let Some((first, others)) = units.split_first().filter(|(_, others)| !others.is_empty()) else {
         return Err(Error::Argument {
@@ -124,7 +124,7 @@ pub(super) fn check(units: &[UnitModel]) -> Result<Vec<String>> {
     Ok(remarks(units))
 }
 
-/// In what the second is no unit of the first's kind.
+/// Describes how the second recording is of another kind of unit, if it is.
 fn other_kind(first: &RecordingFile, other: &RecordingFile) -> Option<String> {
     if first.sensor != other.sensor {
         return Some(format!("its sensor is \"{}\", not \"{}\"", other.sensor, first.sensor));
@@ -134,7 +134,7 @@ fn other_kind(first: &RecordingFile, other: &RecordingFile) -> Option<String> {
     if (w, h) != (ow, oh) {
         return Some(format!("its pictures have {ow} x {oh} px, not {w} x {h}"));
     }
-    // A recording that does not say is taken to be in the normal mode.
+    // A recording that does not state its mode is taken to be in the normal one.
     let mode = |r: &RecordingFile| r.mode.clone().unwrap_or_else(|| "normal".into());
     (mode(first) != mode(other))
         .then(|| format!("it is of the mode \"{}\", not \"{}\"", mode(other), mode(first)))

@@ -1,4 +1,4 @@
-//! What a folder does not say of its sensor: given by options, read off its values, or as usual.
+//! Sensor properties that a folder does not state: given by options, inferred from its values, or defaults.
 
 use std::path::Path;
 
@@ -20,28 +20,28 @@ pub struct Assumed {
     pub code: Option<DepthCode>,
     /// Distance between projector and camera, m.
     pub baseline_m: Option<f64>,
-    /// A camera of which all else is as usual.
+    /// Camera model that supplies everything else.
     pub preset: Option<&'static Preset>,
-    /// The depth topic of a bag, or the array of a NumPy archive.
+    /// Depth topic of a bag, or array of a NumPy archive.
     pub topic: Option<String>,
 }
 
-/// Focal length of a Kinect v1 infrared camera to a percent, and the image centre.
+/// Focal length of a Kinect v1 infrared camera, good to a percent, and the image centre.
 const KINECT_INTRINSICS: [f64; 4] = [585.0, 585.0, 319.5, 239.5];
 /// What ROS publishes for an uncalibrated PrimeSense camera; the TUM tools assume it too.
 const ROS_INTRINSICS: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
-/// Of the images that these intrinsics belong to, px.
+/// Size of the images that these intrinsics belong to, px.
 const USUAL_SIZE: (usize, usize) = (640, 480);
 /// Scale of the PNGs in the TUM benchmark.
 const TUM_CODE: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
 
-/// What the benchmark publishes of a colour camera, to which depth is registered.
+/// Calibration that the benchmark publishes for a colour camera, to which depth is registered.
 struct Published {
     name: &'static str,
     /// fx, fy, cx, cy, px.
     intrinsics: [f64; 4],
-    /// k1, k2, p1, p2, k3. Depth is registered to the picture as the lens bends it: with them the
-    /// RPE over 1 s of freiburg1_rpy falls from 64 to 46 mm.
+    /// k1, k2, p1, p2, k3. Depth is registered to the distorted colour image: with these coefficients the RPE
+    /// over 1 s of freiburg1_rpy falls from 64 to 46 mm.
     distortion: Option<[f64; 5]>,
 }
 
@@ -59,8 +59,8 @@ const FREIBURG: [Published; 3] = [
     Published { name: "freiburg3", intrinsics: [535.4, 539.2, 320.1, 247.6], distortion: None },
 ];
 
-/// The benchmark's lists name their bag in a comment, and with it the camera; its pictures are all of
-/// one size.
+/// Published camera of a sequence. The benchmark's lists name their bag, and with it the camera, in a
+/// comment; its images all have one size.
 fn published(list: &Path, size: (usize, usize)) -> Option<&'static Published> {
     if size != USUAL_SIZE {
         return None;
@@ -71,8 +71,8 @@ fn published(list: &Path, size: (usize, usize)) -> Option<&'static Published> {
 }
 
 impl Assumed {
-    /// An option that would have no effect must not look as if it had one.
-    /// An error when anything is assumed where the file `description` describes the sensor.
+    /// Rejects options that would have no effect.
+    /// Fails if anything is assumed where the file `description` describes the sensor.
     pub(super) fn refuse_beside(&self, description: &Path) -> Result<()> {
         let code = self.code.map(|code| match code {
             DepthCode::Metric { .. } => "--units-per-metre",
@@ -95,7 +95,7 @@ impl Assumed {
         })
     }
 
-    /// An error when a topic is chosen where there are none.
+    /// Fails if a topic is chosen where there are none.
     pub(super) fn refuse_topic(&self, root: &Path) -> Result<()> {
         match &self.topic {
             Some(topic) => Err(Error::Argument {
@@ -106,7 +106,7 @@ impl Assumed {
         }
     }
 
-    /// The Kinect whose fakenect dump has frames of `size` px, and what was assumed of it.
+    /// The Kinect of a fakenect dump with frames of `size` px, and what was assumed of it.
     pub(super) fn dump_sensor(&self, size: (usize, usize)) -> Result<(Sensor, Option<String>)> {
         let known = self.intrinsics.is_some() || self.preset.is_some();
         let remark = (!known || self.code.is_none()).then(|| {
@@ -120,8 +120,7 @@ impl Assumed {
         Ok((kinect.sensor(name, size, KINECT_INTRINSICS, OPENKINECT)?, remark))
     }
 
-    /// The sensor of a TUM sequence with this depth list and images of `size` px, and what was
-    /// assumed of it.
+    /// Sensor of a TUM sequence with this depth list and images of `size` px, and what was assumed of it.
     pub(super) fn sequence_sensor(
         &self,
         list: &Path,
@@ -153,9 +152,8 @@ impl Assumed {
         Ok((self.sensor(NAME, size, ROS_INTRINSICS, TUM_CODE)?, remark))
     }
 
-    /// The sensor of a plain folder with these images, and what was assumed of it. How raw values
-    /// become metres is told, or decided by the values themselves: a guess would give numbers that
-    /// look right.
+    /// Sensor of a plain folder with these images, and what was assumed of it. The depth code is given or
+    /// inferred from the values themselves: a guess would give numbers that look right.
     pub(super) fn images_sensor(
         &self,
         root: &Path,
@@ -196,8 +194,8 @@ impl Assumed {
         Ok((sensor, Some(format!("{why}; give --units-per-metre or --raw-disparity if not"))))
     }
 
-    /// A sensor with images of this size, px, as usual where nothing else is known.
-    /// An error when the intrinsics are no camera's, or none are usual for this size.
+    /// Sensor with images of this size, px, using the usual values where nothing else is known.
+    /// Fails if the intrinsics are not a camera's, or if there are none for this size.
     pub(crate) fn sensor(
         &self,
         name: &str,
@@ -205,7 +203,7 @@ impl Assumed {
         usual_intrinsics: [f64; 4],
         usual_code: DepthCode,
     ) -> Result<Sensor> {
-        // Of a preset that has no images of this shape nothing else is guessed.
+        // For a preset without images of this shape, nothing else is guessed.
         let usual = match self.preset {
             Some(preset) => preset.intrinsics((width, height)),
             None => ((width, height) == USUAL_SIZE).then_some(usual_intrinsics),

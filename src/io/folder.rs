@@ -13,8 +13,8 @@ use crate::error::{Error, Result};
 use crate::read::{is_there, read_text};
 use crate::view::{FrameRef, Sensor};
 
-/// depth.txt and depth/ as in the TUM benchmark, read as a film of a target. A recording.json
-/// beside depth.txt describes its sensor, as simulated rooms have it.
+/// Reads depth.txt and depth/ of the TUM benchmark as a film of a target. A recording.json beside depth.txt
+/// describes the sensor, as in simulated rooms.
 pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let path = root.join(DEPTH_LIST);
     let list = read_list(&path)?;
@@ -29,8 +29,8 @@ pub(super) fn sequence(root: &Path, assumed: &Assumed) -> Result<(Footage, Senso
 }
 
 impl Footage {
-    /// With the sensor by the recording.json in `root`, beside which nothing may be `assumed`, else `by_options`;
-    /// and remarks on either.
+    /// Adds the sensor from the recording.json in `root`, beside which nothing may be `assumed`, else from
+    /// `by_options`; and remarks on either.
     fn described(
         mut self,
         root: &Path,
@@ -52,7 +52,7 @@ impl Footage {
     }
 }
 
-/// 30 Hz: a plain folder has no clock, and every sensor of this kind runs at it.
+/// 30 Hz: a plain folder has no timestamps, and every sensor of this kind runs at this rate.
 pub(super) const NOMINAL_INTERVAL_S: f64 = 1.0 / 30.0;
 
 fn is_image(path: &Path) -> bool {
@@ -63,7 +63,7 @@ fn is_called_image(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
 }
 
-/// Does a folder hold images, and no view?
+/// Whether a folder holds images and no view.
 pub(super) fn is_plain(root: &Path) -> Result<bool> {
     let files = entries(root)?;
     Ok(files.iter().any(|p| is_image(p)) && !files.iter().any(|p| is_view(p)))
@@ -76,7 +76,7 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
     let odd = files.extract_if(.., |p| !p.is_file()).collect::<Vec<_>>();
     let odd = odd.iter().map(|p| format!("{} is not a regular file; left out", p.display()));
     let remarks: Vec<String> = odd.collect();
-    // A calibration leaves pictures, which are no depth.
+    // The pictures that a calibration writes are not depth images.
     if let Some(error) = results_in(root) {
         return Err(error);
     }
@@ -93,13 +93,13 @@ pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)
     Ok((Footage { frames, ..film }, sensor))
 }
 
-/// What a folder without a recording holds instead, as far as it is known.
-/// An error when it cannot be listed.
+/// Error saying what the folder holds instead of a recording.
+/// Fails if it cannot be listed.
 pub(crate) fn nothing_in(root: &Path) -> Result<Error> {
     const REMEDY: &str =
         "give the folder of a recording, a TUM sequence, a fakenect dump or 16-bit PNGs";
     let there = entries(root)?;
-    // Views have lists as films have; several of them are a recording without its description.
+    // Views have a depth.txt as films do; several of them are a recording without its description.
     let films = |p: &Path| [DESCRIPTION, "groundtruth.txt"].iter().any(|n| p.join(n).is_file());
     if there.iter().filter(|p| is_view(p) && !films(p)).count() > 1 {
         let what = "recording.json is missing beside the views in this folder";
@@ -127,7 +127,7 @@ pub(crate) fn nothing_in(root: &Path) -> Result<Error> {
     })
 }
 
-/// Files that together only the results of a command have.
+/// Sets of files that only the results of one command contain.
 const RESULTS: [(&[&str], &str); 6] = [
     (&["diagnosis.json", "report.html"], "diagnose"),
     (&["sigma.svg", "report.html"], "calibrate"),
@@ -137,7 +137,7 @@ const RESULTS: [(&[&str], &str); 6] = [
     (&["sigma.json"], "correct --sigma"),
 ];
 
-/// Results taken for what they were made of.
+/// Error for a folder of results given as input.
 pub(crate) fn results_in(root: &Path) -> Option<Error> {
     let of = |names: &[&str]| names.iter().all(|name| root.join(name).is_file());
     let (names, command) = RESULTS.iter().find(|(names, _)| of(names))?;
@@ -152,7 +152,7 @@ fn holds_recording(folder: &Path) -> bool {
 }
 
 pub(crate) const INDEX: &str = "INDEX.txt";
-/// INDEX.txt and the depth frames that it names.
+/// Reads INDEX.txt and the depth frames it names.
 pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let index = root.join(INDEX);
     let text = read_text(&index)?;

@@ -1,4 +1,4 @@
-//! Depth images read and written, and colour written: PNG, PGM as fakenect writes it.
+//! Reading and writing depth images, and writing colour images: PNG, and PGM as fakenect writes it.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::frame::Frame;
 use crate::read::{open, read_depth_image, read_image};
 use crate::view::FrameRef;
 
-/// Reads frames of one fixed size and keeps the hash of all bytes it has read.
+/// Reads frames of one fixed size and hashes all the bytes it reads.
 #[derive(Debug, Clone)]
 pub struct FrameSource {
     width: usize,
@@ -23,13 +23,13 @@ pub struct FrameSource {
 const REMEDY_DEPTH: &str = "depth must be a 16-bit single-channel PNG of the recording's size";
 
 impl FrameSource {
-    /// For frames of this size, px.
+    /// Source for frames of this size, px.
     pub fn new(width: usize, height: usize) -> Self {
         FrameSource { width, height, hash: Sha256::new() }
     }
 
-    /// A frame of a recording, in a file of its own or not.
-    /// An error when the file is missing, truncated, of another kind (8 bit, colour) or size.
+    /// Reads a frame of a recording, from its own file or a container.
+    /// Fails if the file is missing, truncated, or of another kind (8 bit, colour) or size.
     pub fn frame(&mut self, frame: &FrameRef) -> Result<Frame> {
         let Some(within) = &frame.within else { return self.read(&frame.path) };
         let image = within.store.frame(within.index)?;
@@ -38,20 +38,20 @@ impl FrameSource {
         sized(&frame.path, image, self.width, self.height)
     }
 
-    /// One image file. Errors as those of [`FrameSource::frame`].
+    /// Reads one image file. Fails as [`FrameSource::frame`] does.
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
         let bytes = read_depth_image(path, [self.width, self.height])?;
         self.hash.update(&bytes);
         sized(path, decode(path, &bytes)?, self.width, self.height)
     }
 
-    /// SHA-256 over every byte read so far, in the order it was read.
+    /// SHA-256 of all bytes read so far, in the order they were read.
     pub fn digest(self) -> [u8; 32] {
         self.hash.finalize().into()
     }
 }
 
-/// One depth frame of this size, px, without a hash.
+/// Reads one depth frame of this size, px, without hashing.
 pub(crate) fn read_depth(frame: &FrameRef, width: usize, height: usize) -> Result<Frame> {
     if frame.within.is_some() {
         return sized(&frame.path, read_any(frame)?, width, height);
@@ -80,7 +80,7 @@ pub(crate) fn size_of(frame: &FrameRef) -> Result<(usize, usize)> {
     Ok((frame.width, frame.height))
 }
 
-/// A depth frame of any size.
+/// Reads a depth frame of any size.
 pub(super) fn read_any(frame: &FrameRef) -> Result<Frame> {
     if let Some(within) = &frame.within {
         return within.store.frame(within.index);
@@ -102,7 +102,7 @@ fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
     png16(bytes).map_err(|(what, remedy)| Error::image(path, what, remedy))
 }
 
-/// Or what is wrong and what to do.
+/// Decodes a 16-bit grey PNG. The error is what is wrong and what to do.
 pub(super) fn png16(bytes: &[u8]) -> Result<Frame, (String, &'static str)> {
     let damaged = |e: png::DecodingError| {
         (format!("not a whole PNG ({e})"), "the file is damaged; record it again")
@@ -111,7 +111,7 @@ pub(super) fn png16(bytes: &[u8]) -> Result<Frame, (String, &'static str)> {
     let info = reader.info();
     let (width, height) = (info.width as usize, info.height as usize);
     if !usable_size(width, height) {
-        // The header is not to be believed with memory before the pixels are there.
+        // Do not trust the header with an allocation before the pixels are there.
         return Err((format!("{width} x {height} px PNG"), REMEDY_DEPTH));
     }
     if info.bit_depth != BitDepth::Sixteen || info.color_type != ColorType::Grayscale {
@@ -125,7 +125,8 @@ pub(super) fn png16(bytes: &[u8]) -> Result<Frame, (String, &'static str)> {
     Ok(Frame { width, height, raw })
 }
 
-/// `P5 w h 65535` and little-endian values, against the PGM standard: fakenect writes memory as is.
+/// Decodes `P5 w h 65535` with little-endian values, contrary to the PGM standard:
+/// fakenect dumps its memory as is.
 fn decode_fakenect_pgm(path: &Path, bytes: &[u8]) -> Result<Frame> {
     let bad = |what: &str| Error::image(path, what, "expected a fakenect d-*.pgm: P5, size, 65535");
     let (header, data) = pgm_header(bytes).ok_or_else(|| bad("no P5 header"))?;
@@ -143,7 +144,7 @@ fn decode_fakenect_pgm(path: &Path, bytes: &[u8]) -> Result<Frame> {
     Ok(Frame { width, height, raw })
 }
 
-/// Width, height and greatest value, and the bytes after the single white space that ends them.
+/// Width, height and maximum value, and the bytes after the single white space that ends the header.
 fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
     let mut rest = bytes.strip_prefix(b"P5")?;
     let mut numbers = [0usize; 3];
@@ -158,13 +159,13 @@ fn pgm_header(bytes: &[u8]) -> Option<([usize; 3], &[u8])> {
     usable_size(width, height).then_some((numbers, rest.get(1..)?))
 }
 
-/// A depth frame as the bytes of a 16-bit grey PNG.
-/// An error when the frame's size does not match its raw values.
+/// Encodes a depth frame as a 16-bit grey PNG.
+/// Fails if the frame's size does not match its raw values.
 pub fn encode_png16(frame: &Frame) -> Result<Vec<u8>> {
     encode_depth(frame, Compression::Balanced, None)
 }
 
-/// What a corrected depth image says of itself: keyword and text of a PNG's tEXt chunk.
+/// How a corrected depth image is marked: keyword and text of a tEXt chunk.
 const CORRECTED: [&str; 2] = ["Comment", "biases taken out by kinoise correct"];
 
 /// As [`encode_png16`], marked as corrected.
@@ -172,7 +173,7 @@ pub(crate) fn encode_corrected(frame: &Frame) -> Result<Vec<u8>> {
     encode_depth(frame, Compression::Balanced, Some(CORRECTED))
 }
 
-/// Does the image say that its biases are taken out? What cannot be read says nothing.
+/// Whether the image is marked as corrected; false if it cannot be read.
 pub(crate) fn is_corrected(path: &Path) -> bool {
     let Ok(file) = open(path) else { return false };
     let Ok(reader) = png::Decoder::new(std::io::BufReader::new(file)).read_info() else {
@@ -183,18 +184,18 @@ pub(crate) fn is_corrected(path: &Path) -> bool {
     said.any(|chunk| chunk.keyword == keyword && chunk.text == text)
 }
 
-/// As [`encode_png16`], in a tenth of the time and some more bytes.
+/// As [`encode_png16`], in a tenth of the time but slightly larger.
 pub fn encode_png16_quickly(frame: &Frame) -> Result<Vec<u8>> {
     encode_depth(frame, Compression::Fast, None)
 }
 
-/// Red, green, blue, row-major, as the bytes of an 8-bit PNG, at the quickest compression.
-/// An error when there are not three bytes a pixel.
+/// Encodes red, green, blue (row-major) as an 8-bit PNG with the fastest compression.
+/// Fails if there are not three bytes per pixel.
 pub fn encode_rgb(width: usize, height: usize, rgb: &[u8]) -> Result<Vec<u8>> {
     encode([width, height], (ColorType::Rgb, BitDepth::Eight), Compression::Fast, None, rgb)
 }
 
-/// A depth frame as fakenect writes it: a PGM whose values are little-endian.
+/// Encodes a depth frame as fakenect does: a PGM with little-endian values.
 pub fn encode_pgm16(frame: &Frame) -> Vec<u8> {
     let mut bytes = format!("P5 {} {} 65535\n", frame.width, frame.height).into_bytes();
     bytes.extend(frame.raw.iter().flat_map(|w| w.to_le_bytes()));
@@ -219,7 +220,7 @@ fn encode(
     data: &[u8],
 ) -> Result<Vec<u8>> {
     let failed = |e: png::EncodingError| Error::Drawing { what: "PNG", why: e.to_string() };
-    // What a sensor sees shrinks to less than it was, if only by its filtered rows.
+    // Real depth images compress to less than their raw size, if only through row filtering.
     let mut bytes = Vec::with_capacity(data.len());
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(colour);

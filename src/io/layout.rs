@@ -1,4 +1,4 @@
-//! The recording layout: recording.json and one folder a view (`crate::docs::layouts`).
+//! The recording layout: recording.json and one folder per view (`crate::docs::layouts`).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -96,11 +96,11 @@ impl ViewFile {
     }
 }
 
-/// What a view's numbers may be.
+/// Allowed ranges of a view's numbers.
 const LENGTH_M: [f64; 2] = [1e-3, FARTHEST_M];
-/// Electronics stop long before.
+/// Electronics fail long before these limits.
 const TEMPERATURE_C: [f64; 2] = [-100.0, 200.0];
-/// The sun gives 1.3e5 lx.
+/// Direct sunlight is 1.3e5 lx.
 const AMBIENT_LUX: [f64; 2] = [0.0, 1e6];
 
 impl ViewFile {
@@ -141,7 +141,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
     for folder in entries(root)? {
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if !is_view(&folder) {
-            // What cannot be looked into may be a view.
+            // A folder that cannot be read may be a view.
             if let (true, Err(e)) = (folder.is_dir(), std::fs::read_dir(&folder)) {
                 recording.excluded.push(Excluded::of(&name, &Error::read(&folder, e)));
             }
@@ -158,7 +158,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
 
 pub(super) fn read_sensor(path: &Path, unknown: &mut UnknownKeys) -> Result<Sensor> {
     let text = read_json(path)?;
-    // Another format has other keys: its name says more than the first key that is missing.
+    // Another format has other keys: its name says more than the first missing key.
     let Format { format } = parse(path, &text)?;
     if format != RECORDING_FORMAT {
         let what = format!("format is \"{format}\", expected \"{RECORDING_FORMAT}\"");
@@ -185,9 +185,9 @@ fn parse<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
     serde_json::from_str(text).map_err(|e| Error::text(path, e.line(), plainly(&e), REMEDY_JSON))
 }
 
-/// The line of the first key that a message names; 0 where it names none.
+/// Line of the first key that a message names; 0 if it names none.
 fn line_named(text: &str, message: &str) -> usize {
-    // "sensor's" is no key.
+    // "sensor's" is not a key.
     let words = message.split(|c: char| !(c.is_alphanumeric() || "_'".contains(c)));
     let line_of = |word: &str| {
         let key = format!("\"{word}\"");
@@ -199,8 +199,8 @@ fn line_named(text: &str, message: &str) -> usize {
     words.filter(|w| !w.is_empty()).find_map(line_of).map_or(0, |k| k + 1)
 }
 
-/// As [`parse`]; a value of the wrong type is told by its key, which serde does not say: it is the one
-/// that spoils a `good` document.
+/// As [`parse`], but names the key whose value has the wrong type, which serde does not: the one
+/// that breaks a `good` document.
 fn parse_named<T: serde::de::DeserializeOwned>(path: &Path, text: &str, good: &Value) -> Result<T> {
     let spoils = |(key, value): (&String, &Value)| {
         let mut trial = good.clone();
@@ -215,7 +215,7 @@ fn parse_named<T: serde::de::DeserializeOwned>(path: &Path, text: &str, good: &V
     })
 }
 
-/// As [`parse_named`]; absurd values are refused, and keys that nobody reads noted.
+/// As [`parse_named`], but also rejects absurd values and notes unknown keys.
 fn parse_whole<T: Serialize + serde::de::DeserializeOwned>(
     path: &Path,
     text: &str,
@@ -231,7 +231,7 @@ fn parse_whole<T: Serialize + serde::de::DeserializeOwned>(
     Ok(file)
 }
 
-/// An error at the line of the key that it names.
+/// Error at the line of the key that `what` names.
 fn wrong(path: &Path, text: &str, what: String) -> Error {
     Error::text(path, line_named(text, &what), what, REMEDY_JSON)
 }
@@ -275,7 +275,7 @@ fn read_notes(path: &Path, unknown: &mut UnknownKeys) -> Result<ViewNotes> {
     file.notes().map_err(|what| wrong(path, &text, what))
 }
 
-/// Write `view.json` into the view's folder; nothing where nothing is known.
+/// Writes `view.json` into the view's folder, unless the notes are empty.
 pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
     if *notes == ViewNotes::default() {
         return Ok(());
@@ -284,26 +284,26 @@ pub fn write_view_notes(folder: &Path, notes: &ViewNotes) -> Result<()> {
     write_json(&folder.join(VIEW_FILE), &ViewFile::of(notes), remedy).map(drop)
 }
 
-/// Write `recording.json` for `sensor` into `root`.
+/// Writes `recording.json` for `sensor` into `root`.
 pub fn write_recording_file(root: &Path, sensor: &Sensor) -> Result<()> {
     let remedy = "the sensor's numbers must be finite";
     write_json(&root.join(DESCRIPTION), &RecordingFile::of(sensor), remedy).map(drop)
 }
 
-/// Keys that no part of the program reads, and the files they stand in: a slip of the pen, or a
-/// newer layout. Told, not fatal: files of later versions stay readable.
+/// Keys that no part of the program reads, and the files that contain them: typing mistakes or a newer
+/// layout. Reported but not fatal, so that files of later versions stay readable.
 #[derive(Default)]
 pub(super) struct UnknownKeys(BTreeMap<String, Vec<PathBuf>>);
 
 impl UnknownKeys {
-    /// Whatever `given` has and `understood` (the same document, read and written again) has not.
+    /// Notes the keys of `given` missing from `understood` (the same document, parsed and serialised again).
     pub fn note(&mut self, path: &Path, given: &Value, understood: &Value) {
         for key in unknown_keys(given, understood) {
             self.0.entry(key).or_default().push(path.to_path_buf());
         }
     }
 
-    /// A remark a key, not a remark a file.
+    /// One remark per key, not per file.
     pub fn remarks(&self) -> impl Iterator<Item = String> {
         self.0.iter().map(|(key, files)| {
             let others = match files.len() - 1 {
@@ -319,7 +319,7 @@ fn unknown_keys(given: &Value, understood: &Value) -> Vec<String> {
     let Some(given) = given.as_object() else { return Vec::new() };
     given
         .iter()
-        // null is how some programs write "not given".
+        // Some programs write null for "not given".
         .filter(|(_, value)| !value.is_null())
         .flat_map(|(key, value)| match understood.get(key) {
             None => vec![key.clone()],

@@ -7,20 +7,20 @@ use crate::read::read_text;
 use crate::units::{counted, verb};
 use crate::view::FrameRef;
 
-/// Stamps from here on are no times, s: thirty thousand years.
+/// Timestamps from here on are not times, s: thirty thousand years.
 const LATEST_S: f64 = 1e12;
 
-/// The frames a list names, in time order, and what was odd about it.
+/// The frames that a list names, in time order, and remarks on it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FrameList {
     pub frames: Vec<FrameRef>,
     pub remarks: Vec<String>,
 }
 
-/// Read a list; paths in it are relative to the folder it stands in.
+/// Reads a list; its paths are relative to its folder.
 ///
-/// Files that are missing, stamps out of order and stamps given twice are remarks, not errors.
-/// An error when a line is not "timestamp path".
+/// Missing files, timestamps out of order and duplicate timestamps are remarks, not errors.
+/// Fails if a line is not "timestamp path".
 pub fn read_list(path: &Path) -> Result<FrameList> {
     let text = read_text(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -46,7 +46,7 @@ pub fn read_list(path: &Path) -> Result<FrameList> {
     Ok(list)
 }
 
-/// Lines that are neither empty nor comments, with their numbers from 1.
+/// Lines that are neither empty nor comments, with their line numbers from 1.
 pub(crate) fn content_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let trimmed = text.lines().map(|line| line.trim_start_matches('\u{feff}').trim());
     (1..).zip(trimmed).filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
@@ -84,12 +84,12 @@ fn put_in_order(list: &mut FrameList, file: &str) {
     }
 }
 
-/// A path as it can be quoted in a message: the longest that systems have is shown.
+/// A path shortened for a message; the longest path of common systems is shown whole.
 fn shorten_path(named: &str) -> String {
     named.chars().take(1024).collect()
 }
 
-/// A line as it can be quoted in a message.
+/// A line shortened for a message.
 pub(super) fn shorten(line: &str) -> String {
     const QUOTED: usize = 60;
     let mut short: String = line.chars().take(QUOTED).collect();

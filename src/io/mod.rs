@@ -1,4 +1,4 @@
-//! Files in, files out. One reader a file; every layout ends as the same [`Recording`].
+//! Reading and writing files. Each format has one reader; every layout ends as the same [`Recording`].
 
 mod assumed;
 mod container;
@@ -39,16 +39,16 @@ use crate::frame::DepthCode;
 use crate::read::is_there;
 use crate::view::{FrameRef, Recording, Sensor};
 
-/// How the files of a recording lie in its folder.
+/// How the files of a recording are laid out in its folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
-    /// recording.json, and a folder a view.
+    /// recording.json and one folder per view.
     Recording,
-    /// depth.txt, as in the TUM benchmark; recording.json beside it is read too.
+    /// depth.txt as in the TUM benchmark; a recording.json beside it is read too.
     Sequence,
     /// What fakenect-record writes.
     Dump,
-    /// PNGs; recording.json beside them is read too.
+    /// PNGs; a recording.json beside them is read too.
     Images,
     /// One file with many frames: a bag or a stack of arrays.
     Container,
@@ -58,8 +58,8 @@ const WHAT_TO_GIVE: &str = "give the folder of a recording, a TUM sequence, a fa
                             a ROS bag (.bag, .mcap, .db3), or a NumPy stack (.npy, .npz)";
 
 impl Layout {
-    /// Of a folder or a file.
-    /// An error when there is neither, or when the file holds no frames.
+    /// Layout of a folder or a file.
+    /// Fails if `path` does not exist, or is a file that holds no frames.
     pub fn of(path: &Path) -> Result<Self> {
         if container::is_one(path) {
             return Ok(Layout::Container);
@@ -71,7 +71,7 @@ impl Layout {
             };
             return Err(Error::recording(path, what, WHAT_TO_GIVE));
         }
-        // A described film or plain folder has its frames at the root, a recording in one folder a view.
+        // A described film or plain folder has its frames at the root; a recording has one folder per view.
         let sequence = is_there(&path.join(DEPTH_LIST))?;
         let described = is_there(&path.join(DESCRIPTION))? && !sequence;
         Ok(if described && !folder::is_plain(path)? {
@@ -86,15 +86,15 @@ impl Layout {
     }
 }
 
-/// Open whatever stands at `path`: a recording, a TUM folder, a fakenect dump, a plain folder
-/// of 16-bit PNGs, a ROS bag or a NumPy stack. Frames are not read, except to find still stretches in a film. An error when the
-/// folder is none of these, is empty, or describes itself wrongly; or when something is assumed of a
-/// recording that describes itself.
+/// Opens `path`: a recording, a TUM folder, a fakenect dump, a plain folder of 16-bit PNGs, a ROS bag or a
+/// NumPy stack. Frames are not read, except to find still stretches in a film.
+/// Fails if the folder is none of these, is empty or describes itself wrongly, or if something is assumed of
+/// a recording that describes itself.
 pub fn open(path: &Path, assumed: &Assumed) -> Result<Recording> {
     open_and_cut(path, assumed, true)
 }
 
-/// As [`open`], but a film stays whole: one view with all its frames, also those in motion.
+/// As [`open`], but keeps a film whole: one view with all its frames, including those in motion.
 pub fn open_uncut(path: &Path, assumed: &Assumed) -> Result<Recording> {
     open_and_cut(path, assumed, false)
 }
@@ -130,8 +130,8 @@ fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> 
     Ok(recording)
 }
 
-/// Whether the raw values in some of these frames can be what `code` takes them for.
-/// An error when they cannot; a remark when it is doubtful.
+/// Checks that the raw values in some of these frames can be what `code` says.
+/// Fails if they cannot; returns a remark if it is doubtful.
 pub(crate) fn refuse_impossible(
     root: &Path,
     code: DepthCode,
@@ -144,8 +144,8 @@ pub(crate) fn refuse_impossible(
     }
 }
 
-/// The sensor of a folder with these images, and remarks on what had to be assumed: from its
-/// recording.json, from what is usual in a dump, or from `assumed`.
+/// Sensor of a folder with these images, and remarks on what was assumed: from its recording.json, from the
+/// defaults for a dump, or from `assumed`.
 pub(crate) fn describe_folder(
     root: &Path,
     images: &[FrameRef],

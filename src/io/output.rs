@@ -1,5 +1,5 @@
-//! Files and folders. Outputs appear whole or not at all: written beside their place, then renamed
-//! into it.
+//! Writing files and folders. Outputs appear whole or not at all: written beside
+//! their final path, then renamed.
 
 use std::fs;
 use std::io::{self, ErrorKind, Write};
@@ -12,8 +12,8 @@ use tempfile::NamedTempFile;
 use super::unfinished::{is_being_filled, unfinished};
 use crate::error::{Error, Result};
 
-/// Never mix a new recording into somebody's folder.
-/// An error when the folder has something in it.
+/// Keeps a new recording out of an existing folder.
+/// Fails if the folder is not empty.
 pub fn refuse_full(root: &Path) -> Result<()> {
     let full = fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
     if full {
@@ -26,18 +26,18 @@ pub fn refuse_full(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Write beside `path`, then rename: a kill, a full disk or a power cut leaves the old file, or none.
-/// An error when the folder cannot be written; the temporary file is then removed.
+/// Writes beside `path`, then renames: a kill, a full disk or a power cut leaves the old file, or none.
+/// Fails if the folder cannot be written; the temporary file is then removed.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomic_with(path, |file| file.write_all(bytes))
 }
 
-/// As [`write_atomic`], piece by piece.
+/// As [`write_atomic`], writing in pieces.
 pub(crate) fn write_atomic_with(
     path: &Path,
     write: impl FnOnce(&mut fs::File) -> io::Result<()>,
 ) -> Result<()> {
-    // A device of that name would be gone.
+    // Renaming would replace a device of that name.
     if fs::metadata(path).is_ok_and(|standing| !standing.is_file() && !standing.is_dir()) {
         let what = "a pipe or a device stands there, no file";
         return Err(Error::recording(path, what, "choose another name"));
@@ -47,14 +47,13 @@ pub(crate) fn write_atomic_with(
         write(file.as_file_mut())?;
         file.as_file().sync_all()?;
         file.persist(path)?;
-        // A folder that is being filled is synced once, when it is whole.
+        // A folder being filled is synced once, when it is complete.
         if is_being_filled(folder) { Ok(()) } else { sync_folder(folder) }
     });
     written.map_err(|e| Error::write(path, e))
 }
 
-/// A file of a passing name, with the permissions of any new file. It is locked, which what a killed
-/// run has left is not.
+/// Locked temporary file with the permissions of any new file; what a killed run left is not locked.
 fn beside(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     let name = unfinished();
@@ -62,12 +61,12 @@ fn beside(folder: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // less the umask
     let file = builder.tempfile_in(folder)?;
-    // Where there are no locks its youth protects it.
+    // Without file locks, only its age tells it from a stale file.
     let _ = file.as_file().try_lock();
     Ok(file)
 }
 
-/// The names in a folder, to the disk itself. Some systems open no folders, and some disks sync none.
+/// Flushes a folder's entries to disk. Some systems cannot open folders, and some disks cannot sync them.
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     let Ok(file) = fs::File::open(folder) else { return Ok(()) };
     match file.sync_all() {
@@ -76,22 +75,22 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// JSON for people to read, with a line's end at its end.
-/// An error when the value has no form in JSON.
+/// Pretty-printed JSON with a trailing newline.
+/// Fails if the value cannot be represented in JSON.
 pub fn pretty_json(value: &impl Serialize) -> serde_json::Result<String> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
     Ok(text)
 }
 
-/// Write [`pretty_json`] whole or not at all; the text. `remedy` is for what has no form in JSON.
+/// Writes [`pretty_json`] atomically and returns the text. `remedy` is for values that JSON cannot represent.
 pub fn write_json(path: &Path, value: &impl Serialize, remedy: &'static str) -> Result<String> {
     let text = pretty_json(value).map_err(|e| Error::text(path, 0, e.to_string(), remedy))?;
     write_atomic(path, text.as_bytes())?;
     Ok(text)
 }
 
-/// What stands in a folder, in name order.
+/// Entries of a folder, sorted by name.
 pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let failed = |e| Error::read(folder, e);
     let mut paths = fs::read_dir(folder)
@@ -103,7 +102,7 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// A few of the names.
+/// The first few names, and how many more there are.
 pub(crate) fn listed(names: &[String]) -> String {
     const SHOWN: usize = 3;
     let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
@@ -136,7 +135,7 @@ mod tests {
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
-    /// Others shall read results as they read any file: temporary files are their owner's alone.
+    /// Others must be able to read results; temporary files are private to their owner by default.
     #[cfg(unix)]
     #[test]
     fn a_file_has_the_permissions_of_any_new_file() {

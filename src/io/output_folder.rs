@@ -1,8 +1,8 @@
-//! The one rule for what a command leaves behind.
+//! Output folders: the one rule for what a command leaves behind.
 //!
-//! A folder is filled beside its place and put there when it is whole: until then no reader takes it
-//! for a result, however the run ends. It goes to a new or empty place, or over the results of an
-//! earlier run of the same command; over anything else only when forced. It never goes into an input.
+//! A folder is filled beside its final place and moved there when complete; until then no reader takes it for
+//! a result, however the run ends. It goes to a new or empty place or over earlier results of the same
+//! command; over anything else only if forced. It never goes into an input.
 
 use std::ffi::OsString;
 use std::fs;
@@ -15,26 +15,26 @@ use super::output::{entries, listed, sync_folder, write_atomic};
 use super::unfinished::{Open, UNFINISHED, discard, discard_stale, lock, register, unfinished};
 use crate::error::{Error, Result};
 
-/// Of a folder that another run has.
+/// Error for a folder that another run has locked.
 const TAKEN: [&str; 2] = [
     "another run is writing into this folder",
     "wait until it has ended, or choose another folder",
 ];
 
-/// What a command fills its folder with.
+/// What a command writes into its folder.
 #[derive(Debug, Clone, Copy)]
 pub enum Leaves {
-    /// Files and folders of these names; one that ends in `-` stands for all that begin so.
+    /// Files and folders of these names; a name ending in `-` is a prefix.
     Results {
         names: &'static [&'static [&'static str]],
-        /// Of them, what no other command writes: where none is there, the rest is somebody else's.
+        /// Names that no other command writes; without one of them the other files count as foreign.
         marks: &'static [&'static str],
     },
-    /// A recording or a sequence: all that is in the folder belongs to it.
+    /// A recording or a sequence: everything in the folder belongs to it.
     Recording,
 }
 
-/// A folder on its way; thrown away when dropped before [`OutputFolder::finish`].
+/// An output folder in preparation; discarded if dropped before [`OutputFolder::finish`].
 #[derive(Debug)]
 pub struct OutputFolder {
     place: PathBuf,
@@ -42,28 +42,28 @@ pub struct OutputFolder {
     leaves: Leaves,
     stands: Stands,
     forced: bool,
-    /// Folders made for this one, the innermost first.
+    /// Parent folders created for this one, innermost first.
     parents: Vec<PathBuf>,
-    /// Of the folder at the place, until this one is put there, and of this one.
+    /// Locks on the folder at the place, until this one is moved there, and on this one.
     _locks: [Option<fs::File>; 2],
     done: bool,
 }
 
-/// What was at the place in the beginning.
+/// What was at the place when the run began.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stands {
     Nothing,
     Empty,
     /// Results of the same command, or a recording to be replaced.
     Earlier,
-    /// What others wrote: it stays, but for what has the same name.
+    /// Files of others: they stay, except those of the same name.
     Others,
 }
 
 impl OutputFolder {
-    /// Find out whether the place may be written, before the work begins. `inputs` are the files and
-    /// folders that are read; `force` writes where others have written.
-    /// An error when it may not, or cannot.
+    /// Checks, before the work begins, that the place may be written. `inputs` are the files and folders that
+    /// are read; `force` allows writing among files of others.
+    /// Fails if the place must not or cannot be written.
     pub fn begin(place: &Path, leaves: Leaves, inputs: &[&Path], force: bool) -> Result<Self> {
         for input in inputs.iter().filter(|input| input.is_dir()) {
             refuse_inside(place, input)?;
@@ -72,7 +72,7 @@ impl OutputFolder {
         for input in inputs {
             refuse_replacing(place, leaves, input)?;
         }
-        // Where nothing stands yet, the first to finish has the place, and the other says so.
+        // If nothing exists yet, the first run to finish gets the place; the other fails.
         let of_place = if stands == Stands::Nothing { None } else { lock(place, TAKEN)? };
         let unique = format!("{}{}", unfinished(), next_number());
         let (parents, staging) = if stands == Stands::Nothing {
@@ -80,7 +80,7 @@ impl OutputFolder {
             let parent = absolute.parent().unwrap_or(&absolute).to_path_buf();
             (make_parents(&parent).map_err(|e| Error::write(place, e))?, parent.join(unique))
         } else {
-            // Within, for it may be a mount or a link: renaming stays on one disk.
+            // Inside, because it may be a mount or a link: the rename must stay on one disk.
             (Vec::new(), place.join(unique))
         };
         staging.parent().into_iter().for_each(discard_stale);
@@ -94,7 +94,7 @@ impl OutputFolder {
             _locks: [of_place, None],
             done: false,
         };
-        // A name that is too long would be found out only when all is done.
+        // Detects a name that is too long now, not when all the work is done.
         if let Err(e) = fs::symlink_metadata(place)
             && e.kind() != std::io::ErrorKind::NotFound
         {
@@ -113,39 +113,38 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// Where to write.
+    /// Folder to write into.
     pub fn path(&self) -> &Path {
         &self.staging
     }
 
-    /// Where it will stand.
+    /// Final path of the folder.
     pub fn place(&self) -> &Path {
         &self.place
     }
 
-    /// Is it to take the place of earlier results?
+    /// Whether it will replace earlier results.
     pub fn replaces(&self) -> bool {
         self.stands == Stands::Earlier
     }
 
-    /// Was it begun with `force`?
+    /// Whether it was begun with `force`.
     pub fn forced(&self) -> bool {
         self.forced
     }
 
-    /// Write one file of the output.
-    /// An error when the folder has become unwritable or the disk is full.
+    /// Writes one file of the output.
+    /// Fails if the folder has become unwritable or the disk is full.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         write_atomic(&self.staging.join(name), bytes)
     }
 
-    /// Put it in its place.
-    /// An error when that has become impossible; what was written is then kept where it was filled, as
-    /// the message says.
+    /// Moves the folder to its place.
+    /// Fails if that has become impossible; the results are then kept where the message says.
     pub fn finish(mut self) -> Result<()> {
-        // A power cut too finds it whole or not there: its names are on the disk before its own is.
+        // Synced before the rename: even a power cut leaves the folder whole or absent.
         let synced = sync_folders(&self.staging);
-        // Held throughout: an interruption finds the folder whole or not there.
+        // Held throughout: an interruption finds the folder whole or absent.
         let mut register = register();
         let put = synced.and_then(|()| match self.stands {
             Stands::Nothing => fs::rename(&self.staging, &self.place)
@@ -155,7 +154,7 @@ impl OutputFolder {
         self.done = true;
         register.open.retain(|open| open.staging != self.staging);
         put.map_err(|cause| {
-            // Under a name that no later run takes for what a killed one left.
+            // Renamed so that no later run takes it for the leftovers of a killed one.
             let kept = self.staging.with_extension("kept");
             let kept = fs::rename(&self.staging, &kept).map_or(&self.staging, |()| &kept);
             Error::Recording {
@@ -168,8 +167,8 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Into the folder that is there. What marks results as whole is the first of the old to go and the
-    /// last of the new to come, so that a kill leaves no mixture that has it.
+    /// Moves the files into the existing folder. The files that mark results as complete are removed first
+    /// and added last, so that a kill leaves no mixture that has them.
     fn put_inside(&self) -> std::io::Result<()> {
         let mut new = names(&self.staging)?;
         new.sort_by_key(|name| (self.comes_last(name), name.clone()));
@@ -188,7 +187,7 @@ impl OutputFolder {
         if old.exists() { fs::remove_dir_all(&old) } else { Ok(()) }
     }
 
-    /// Does this name at the place go when the new results come?
+    /// Whether new results remove this name from the place.
     fn is_replaced(&self, name: &OsString, comes: bool) -> bool {
         match (self.leaves, self.stands) {
             (Leaves::Recording, _) => true,
@@ -221,7 +220,7 @@ fn next_number() -> usize {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// A folder and all below it.
+/// Syncs a folder and everything below it.
 fn sync_folders(folder: &Path) -> std::io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -240,12 +239,12 @@ fn is_unfinished(name: &OsString) -> bool {
     name.to_string_lossy().starts_with(UNFINISHED)
 }
 
-/// Without which a folder is no recording, and which therefore comes last.
+/// Whether this file makes a folder a recording; such files are written last.
 pub(crate) fn is_description(name: &str) -> bool {
     [DESCRIPTION, INDEX, DEPTH_LIST].contains(&name)
 }
 
-/// Make the folders that are not there; those that were made, the innermost first.
+/// Creates the missing folders and returns them, innermost first.
 fn make_parents(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let missing = folder.ancestors().take_while(|f| !f.exists()).map(Path::to_path_buf).collect();
     fs::create_dir_all(folder).map(|()| missing)
@@ -255,10 +254,10 @@ fn no_folder(file: &Path) -> Error {
     Error::recording(file, "this is a file, not a folder", "give another folder, such as with -o")
 }
 
-/// May it be written?
+/// What is at the place. Fails if it must not be written.
 fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
     if fs::symlink_metadata(place).is_err() {
-        // A file on the way there would only say so when the folder is made.
+        // A file among its ancestors would otherwise show only when the folder is created.
         let standing = place.ancestors().find(|p| fs::symlink_metadata(p).is_ok());
         return match standing.filter(|p| !p.as_os_str().is_empty() && !p.is_dir()) {
             Some(file) => Err(no_folder(file)),
@@ -296,7 +295,7 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
                     .any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
             };
             let mut others = there.clone();
-            // A file of a common name is this command's where its mark stands beside it.
+            // A file of a common name is this command's only if a mark is there too.
             let marked = there.iter().any(|name| marks.contains(&name.as_str()));
             others.retain(|name| !(marked && known(name)));
             match (others.is_empty(), force) {
@@ -311,9 +310,9 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
     }
 }
 
-/// An error when what is written would take the place of `input`.
+/// Fails if the output would replace `input`.
 fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
-    // What is not there is its reader's to report.
+    // A missing input is reported by its reader.
     let Ok(input) = input.canonicalize() else { return Ok(()) };
     let place_is = settled(place)?;
     let Ok(within) = input.strip_prefix(&place_is) else { return Ok(()) };
@@ -329,7 +328,7 @@ fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
     Ok(())
 }
 
-/// An error when `place` lies in the folder `input`, or is it: it would become part of what is read.
+/// Fails if `place` is the folder `input` or lies inside it: it would become part of what is read.
 pub fn refuse_inside(place: &Path, input: &Path) -> Result<()> {
     let input = input.canonicalize().map_err(|e| Error::read(input, e))?;
     if settled(place)?.starts_with(input) {
@@ -339,8 +338,7 @@ pub fn refuse_inside(place: &Path, input: &Path) -> Result<()> {
     Ok(())
 }
 
-/// An error when one of two results would lie in the other, or both be one: either would be in the
-/// other's way.
+/// Fails if two outputs are the same folder or one lies inside the other: they would interfere.
 pub fn refuse_nested(one: &Path, other: &Path) -> Result<()> {
     let (a, b) = (settled(one)?, settled(other)?);
     if !a.starts_with(&b) && !b.starts_with(&a) {
@@ -350,14 +348,14 @@ pub fn refuse_nested(one: &Path, other: &Path) -> Result<()> {
     Err(Error::recording(one, what, "choose a folder beside it"))
 }
 
-/// Without links. What does not exist yet has no canonical name; the folder it will stand in has.
+/// Absolute path without links. A path that does not exist yet has no canonical form; an ancestor has.
 fn settled(place: &Path) -> Result<PathBuf> {
     let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
     for folder in absolute.ancestors() {
         if let Ok(standing) = folder.canonicalize() {
             let rest = absolute.strip_prefix(folder).unwrap_or(Path::new(""));
             return Ok(rest.components().fold(standing, |mut path, part| {
-                // Once made, nothing of the rest is a link.
+                // The rest does not exist yet, so it contains no links.
                 match part {
                     Component::ParentDir => drop(path.pop()),
                     part => path.push(part),

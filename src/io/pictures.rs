@@ -1,4 +1,4 @@
-//! Infrared and colour images of the depth's size, read: PNG, JPEG.
+//! Reading infrared and colour images of the depth image's size: PNG, JPEG.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use image::ImageDecoder;
 use crate::error::{Error, Result};
 use crate::read::open;
 
-/// A colour image, PNG or JPEG: red, green, blue, row-major.
+/// A colour image from a PNG or JPEG: red, green, blue, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourImage {
     pub width: usize,
@@ -16,8 +16,8 @@ pub struct ColourImage {
 }
 
 impl ColourImage {
-    /// Read one image of the depth's `size`, width and height, px.
-    /// An error when the file is not a whole PNG or JPEG of that size: pixels would not correspond.
+    /// Reads one image of the depth image's `size`, width and height, px.
+    /// Fails if the file is not a whole PNG or JPEG of that size: pixels would not correspond.
     pub fn read(path: &Path, size: [usize; 2]) -> Result<Self> {
         let remedy = "colour must be a whole PNG or JPEG, registered to depth pixel by pixel";
         let image = decode_of_size(path, "colour", size, remedy)?.into_rgb8();
@@ -25,8 +25,8 @@ impl ColourImage {
     }
 }
 
-/// An image of this size and no other: what is larger is not unpacked, for half a megabyte can hold
-/// gigabytes.
+/// Decodes an image of exactly this size; larger ones are not decompressed, because half
+/// a megabyte can hold gigabytes.
 fn decode_of_size(
     path: &Path,
     kind: &str,
@@ -35,7 +35,7 @@ fn decode_of_size(
 ) -> Result<image::DynamicImage> {
     let damaged = |e: image::ImageError| Error::image(path, e.to_string(), remedy);
     let file = std::io::BufReader::new(open(path)?);
-    // By content: names lie.
+    // Detected from the content: names can be wrong.
     let reader = image::ImageReader::new(file).with_guessed_format();
     let reader = reader.map_err(|e| Error::read(path, e))?;
     let decoder = reader.into_decoder().map_err(damaged)?;
@@ -47,7 +47,7 @@ fn decode_of_size(
     image::DynamicImage::from_decoder(decoder).map_err(damaged)
 }
 
-/// Infrared amplitude, 8 or 16 bit, as numbers.
+/// Infrared amplitude from an 8- or 16-bit image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfraredImage {
     pub width: usize,
@@ -57,8 +57,8 @@ pub struct InfraredImage {
 }
 
 impl InfraredImage {
-    /// Read one image of the depth's `size`, width and height, px.
-    /// An error when the file is not a whole grey PNG of 8 or 16 bits and that size.
+    /// Reads one image of the depth image's `size`, width and height, px.
+    /// Fails if the file is not a whole grey PNG of 8 or 16 bits and that size.
     pub fn read(path: &Path, size: [usize; 2]) -> Result<Self> {
         let remedy = "infrared must be a grey PNG of the depth's size";
         let amplitude = match decode_of_size(path, "infrared", size, remedy)? {

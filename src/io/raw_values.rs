@@ -1,5 +1,5 @@
-//! What the raw values of depth images say of their unit: whether they can be what they are taken for,
-//! and, in a folder that does not say, what they are.
+//! Infers the unit of depth images from their raw values: whether it can be the assumed one and,
+//! without a description, what it is.
 
 use super::images::read_any;
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
@@ -8,47 +8,48 @@ use crate::stats::{median, quantile};
 use crate::units::{decimals, shortest};
 use crate::view::FrameRef;
 
-/// Frames that are looked at, spread over all.
+/// Frames examined, spread over all.
 const MAX_FRAMES: usize = 12;
-/// What some sensors write for "no measurement" beside 0 (7-Scenes).
+/// Value that some sensors write for "no measurement", besides 0 (7-Scenes).
 const ALL_ONES: usize = u16::MAX as usize;
 const NO_DISPARITY: usize = KINECT_NO_MEASUREMENT as usize;
-/// OpenKinect's formula has its pole at 1084.6: no Kinect v1 sends what is above, but for 2047.
+/// OpenKinect's formula has its pole at 1084.6: a Kinect v1 sends nothing above this value but 2047.
 const MAX_DISPARITY: usize = 1092;
-/// Of the pixels: the matching window alone leaves 8 of 640 columns of a Kinect without a disparity,
-/// 1.2 %; in depths, 2047 is a value among thousands.
+/// Smallest share of pixels with 2047 in raw disparities. The matching window alone leaves 8 of a Kinect's
+/// 640 columns (1.2 %) without a disparity; in depths, 2047 is one value among thousands.
 const MIN_SHARE_WITHOUT: f64 = 0.001;
-/// Of the values with a depth: glitches of the readout, of which no real recording at hand has any.
+/// Largest share of depth values above the limit: readout glitches, which no real recording at hand has.
 const MAX_STRAY_SHARE: f64 = 1e-4;
 
-/// Step of a Kinect v1's disparity in inverse depth, 1/m: measured on the 39 views of Herrera,
-/// Kannala and Heikkila (2012), z steps of 2.86e-3 z^2.
+/// Step of a Kinect v1's disparity in inverse depth, 1/m: z steps of 2.86e-3 z^2, measured on the 39 views of
+/// Herrera, Kannala and Heikkila (2012).
 const KINECT_STEP: f64 = 2.86e-3;
-/// Units in a metre that people write: OpenNI and ROS; TUM.
+/// Usual units per metre: OpenNI and ROS; TUM.
 const USUAL_UNITS: [f64; 2] = [1000.0, 5000.0];
-/// The four real recordings in such units at hand (7-Scenes, TUM freiburg1, MIT tabletop, JSK) give
-/// 0.98 to 0.99 of their unit; a stereo camera's 1/32 px in millimetres gives 5600, 1.12 of TUM's.
+/// Tolerance on a usual unit. The four real recordings in such units at hand (7-Scenes, TUM
+/// freiburg1, MIT tabletop, JSK) give 0.98 to 0.99 of theirs; a stereo camera's 1/32 px in
+/// millimetres gives 5600, 1.12 of TUM's.
 const SAME_UNIT: f64 = 0.1;
-/// Steps below this many units are mostly the rounding's.
+/// Steps of fewer units than this are mostly rounding.
 const MIN_STEP: usize = 4;
-/// Steps without which a lattice is not believed, and the width of their middle half beside the
-/// median: 0.04 to 0.11 in those four. A synthetic scene without steps (ICL-NUIM) has 33 such gaps.
+/// Fewest steps for a credible lattice, and their largest interquartile range relative to the median: 0.04 to
+/// 0.11 in those four. A synthetic scene without steps (ICL-NUIM) has 33 such gaps.
 const MIN_STEPS: usize = 40;
 const MAX_SPREAD: f64 = 0.15;
-/// Nothing that measures depth over a room does so nearer than this, m (a Kinect from 0.4 m).
+/// No sensor that covers a room measures nearer than this, m (a Kinect from 0.4 m).
 const NEAREST_M: f64 = 0.3;
-/// Structured light and time of flight of this class end there, m.
+/// Farthest range of structured light and time of flight of this class, m.
 const FARTHEST_M: f64 = 12.0;
 
-/// How often each raw value occurs in some of a recording's frames.
+/// Histogram of the raw values in some of a recording's frames.
 pub(super) struct RawValues {
     counts: Vec<u64>,
-    /// The median value of each frame that has any depth.
+    /// Median value of each frame that has any depth.
     medians: Vec<f64>,
 }
 
 impl RawValues {
-    /// Frames that cannot be read are left out: their reader says why.
+    /// Unreadable frames are skipped: their reader reports why.
     pub fn of<'f>(frames: impl ExactSizeIterator<Item = &'f FrameRef>) -> Self {
         let stride = frames.len().div_ceil(MAX_FRAMES).max(1);
         let mut values = RawValues { counts: vec![0; 1 + ALL_ONES], medians: Vec::new() };
@@ -69,12 +70,12 @@ impl RawValues {
         self.counts[range].iter().sum()
     }
 
-    /// All that may be a depth in one code or another.
+    /// Number of values that may be a depth in some code.
     fn depths(&self) -> u64 {
         self.count(1..=ALL_ONES - 1) - self.counts[NO_DISPARITY]
     }
 
-    /// The smallest and the greatest value that may be a depth.
+    /// Smallest and largest value that may be a depth.
     fn ends(&self) -> Option<[usize; 2]> {
         let mut occurring = (1..ALL_ONES).filter(|&v| v != NO_DISPARITY && self.counts[v] > 0);
         let first = occurring.next()?;
@@ -87,8 +88,8 @@ impl RawValues {
         (stray - code) as f64 / self.depths().max(1) as f64
     }
 
-    /// The 11 bits of a Kinect v1: 2047 where there is no measurement, and nothing else above what
-    /// has a depth.
+    /// Whether these are the 11-bit values of a Kinect v1: 2047 where there is no measurement, and otherwise
+    /// nothing above the largest value that has a depth.
     fn are_disparities(&self) -> bool {
         let all: u64 = self.counts.iter().sum();
         let without = self.counts[NO_DISPARITY] as f64 / all.max(1) as f64;
@@ -97,8 +98,7 @@ impl RawValues {
             && self.share_of_stray(MAX_DISPARITY) < MAX_STRAY_SHARE
     }
 
-    /// Units in a metre if these are the disparity steps of a Kinect: depths then lie
-    /// [`KINECT_STEP`] apart in their inverse.
+    /// Units per metre if these are a Kinect's disparity steps: inverse depths [`KINECT_STEP`] apart.
     fn kinect_units(&self) -> Option<f64> {
         let occurring: Vec<usize> =
             (1..ALL_ONES).filter(|&v| v != NO_DISPARITY && self.counts[v] > 0).collect();
@@ -112,13 +112,13 @@ impl RawValues {
         (high - low < MAX_SPREAD * middle).then_some(KINECT_STEP / middle)
     }
 
-    /// The usual unit that the steps show.
+    /// The usual unit that the steps indicate.
     fn stepped_unit(&self) -> Option<f64> {
         let units = self.kinect_units()?;
         USUAL_UNITS.into_iter().find(|usual| (units / usual - 1.0).abs() < SAME_UNIT)
     }
 
-    /// The code that the values can only be, and why; or what they leave open.
+    /// The only code that explains the values, and why; or what they leave open.
     pub fn code(&self) -> Result<(DepthCode, String), String> {
         let metric = |units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 };
         if self.are_disparities() {
@@ -136,7 +136,7 @@ impl RawValues {
         }
         let [mm, tum] = USUAL_UNITS;
         let [near, far] = ends_of(&self.medians);
-        // Values that are all below the pole may be disparities without a missing pixel.
+        // If all values are below the pole, they may be disparities without a missing pixel.
         let only_mm = near / tum < NEAREST_M && near / mm >= NEAREST_M && far / mm <= FARTHEST_M;
         if only_mm && last > MAX_DISPARITY {
             let why = format!(
@@ -163,7 +163,7 @@ impl RawValues {
         ))
     }
 
-    /// Why these values cannot be what `code` takes them for, and what to do.
+    /// Why these values cannot be in `code`, and what to do.
     pub fn contradiction(&self, code: DepthCode) -> Option<(String, &'static str)> {
         match code {
             DepthCode::Metric { invalid, .. } if invalid != KINECT_NO_MEASUREMENT => {
@@ -192,10 +192,10 @@ impl RawValues {
         }
     }
 
-    /// Why these values may well not be what `code` takes them for.
+    /// Why these values are probably not in `code`.
     pub fn doubt(&self, code: DepthCode) -> Option<String> {
         let DepthCode::Metric { units_per_metre: given, .. } = code else { return None };
-        // A unit that is off by a few percent is a scale, which a diagnosis names.
+        // A unit a few percent off is a scale error, which a diagnosis identifies.
         let other = self.stepped_unit().filter(|unit| !(0.5..2.0).contains(&(unit / given)));
         let shown = shortest(given);
         if let Some(unit) = other {
@@ -222,7 +222,7 @@ fn ends_of(values: &[f64]) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Frames of a wall at these distances, m, in a code; `stepped` as a Kinect's disparities are.
+    /// Frames of a tilted wall at these distances, m, in a code; `stepped` as a Kinect's disparities are.
     fn values(distances_m: &[f64], units: f64, stepped: bool) -> RawValues {
         let mut values = RawValues { counts: vec![0; 1 + ALL_ONES], medians: Vec::new() };
         for &z in distances_m {
@@ -256,7 +256,7 @@ mod tests {
         }
     }
 
-    /// 1/32 px of a stereo camera of 0.095 m and 640 px are no Kinect's steps.
+    /// The 1/32 px steps of a stereo camera with a baseline of 0.095 m and f = 640 px are not a Kinect's.
     #[test]
     fn another_lattice_decides_nothing() {
         let mut seen = values(&[2.0, 3.0, 4.0, 6.0], 1000.0, true);
@@ -285,7 +285,7 @@ mod tests {
         assert_eq!(seen.code().map(|c| c.0), Ok(OPENKINECT));
         let (what, remedy) = seen.contradiction(lengths).unwrap();
         assert!(what.contains("2047") && remedy.contains("--raw-disparity"), "{what}");
-        // A value above the pole is a depth in millimetres, 2047 among them.
+        // A value above the pole is a depth in millimetres, and then so is 2047.
         seen.counts[1800] = 500;
         assert!(seen.contradiction(lengths).is_none());
         seen.counts[3000] = 500;

@@ -1,4 +1,4 @@
-//! Cutting a film into views: stretches in which neither target nor sensor moves.
+//! Cuts a film into views: stretches in which neither target nor sensor moves.
 
 use std::path::{Path, PathBuf};
 
@@ -10,15 +10,15 @@ use crate::view::{FrameRef, Recording, Sensor, View, ViewNotes};
 /// How the frames were taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum Film {
-    /// 30 Hz throughout, also while the target is carried: short stretches are motion.
+    /// 30 Hz throughout, including while the target is carried: short stretches are motion.
     #[default]
     Video,
-    /// Taken on purpose: a single frame is a view.
+    /// Deliberate captures: a single frame is a view.
     Captures,
 }
 
 impl Film {
-    /// A third of a second of stillness is what a hand-held board cannot give by accident.
+    /// Fewest frames in a view. A hand-held board is not still for a third of a second by accident.
     fn shortest(self) -> usize {
         match self {
             Film::Video => 10,
@@ -27,32 +27,32 @@ impl Film {
     }
 }
 
-/// Pixels compared from frame to frame lie on a grid of this pitch, px.
+/// Spacing of the grid of pixels compared from frame to frame, px.
 const GRID_PX: usize = 12;
-/// A sample has moved when its depth changed by more than this share plus this much of z^2 (1/m):
-/// six standard deviations of a Kinect's own noise (Khoshelham: 1.4e-3 z^2) and no less.
+/// A sample has moved if its depth changed by more than this share plus this coefficient (1/m) times z^2: at
+/// least six standard deviations of a Kinect's noise (Khoshelham: 1.4e-3 z^2).
 const MOVED_SHARE: f64 = 0.005;
 const MOVED_QUADRATIC: f64 = 0.009;
-/// The scene has moved when this share of the samples has.
+/// The scene has moved if this share of the samples has.
 const MOVED_SAMPLES: f64 = 0.10;
-/// ... or when samples measured in one of two frames only are this share of those in both: holes
-/// flicker at edges and in shadows, but a board that is carried away leaves one where it was.
+/// ... or if the samples measured in only one of the two frames reach this share of those in both: holes
+/// flicker at edges and in shadows, but a board that is carried away leaves a hole where it was.
 const MOVED_HOLES: f64 = 0.5;
 
-/// Frames that no view file parts, and what is known about them.
+/// Frames not yet divided into views, and what is known about them.
 #[derive(Default)]
 pub(super) struct Footage {
     pub frames: Vec<FrameRef>,
     pub film: Film,
-    /// What was found odd while listing them.
+    /// Oddities found while listing them.
     pub remarks: Vec<String>,
     pub described_by: Vec<PathBuf>,
-    /// Stamps, s, and degrees Celsius, in time order.
+    /// Timestamps, s, and temperatures, degrees Celsius, in time order.
     pub temperatures: Vec<(f64, f64)>,
 }
 
 impl Footage {
-    /// `cut` into views, or all frames as one, in motion or not.
+    /// Recording `cut` into views, or with all frames as one view, in motion or not.
     pub fn recording(self, root: &Path, sensor: Sensor, cut: bool) -> Recording {
         let (mut views, mut remarks) = if cut {
             cut_up(self.frames, self.film, &sensor)
@@ -63,7 +63,7 @@ impl Footage {
         for view in &mut views {
             view.notes.temperature_c = temperature(&view.depth, &self.temperatures);
         }
-        // Why frames are missing says more than what was assumed about the others.
+        // Why frames are missing matters more than what was assumed about the others.
         remarks.extend(self.remarks);
         Recording {
             root: root.to_path_buf(),
@@ -76,7 +76,7 @@ impl Footage {
     }
 }
 
-/// The mean while a view was filmed, or the reading nearest to its begin.
+/// Mean temperature while a view was filmed, or the reading nearest to its start.
 fn temperature(frames: &[FrameRef], readings: &[(f64, f64)]) -> Option<f64> {
     let (first, last) = (frames.first()?.timestamp, frames.last()?.timestamp);
     let during: Vec<f64> =
@@ -92,7 +92,7 @@ fn view(name: String, depth: Vec<FrameRef>) -> View {
     View { name, depth, infrared: Vec::new(), notes: ViewNotes::default() }
 }
 
-/// The still stretches; frames in motion and frames that show nothing are left out, with a remark.
+/// Still stretches as views; frames in motion and frames without depth are left out, with a remark.
 fn cut_up(frames: Vec<FrameRef>, film: Film, sensor: &Sensor) -> (Vec<View>, Vec<String>) {
     let listed = frames.len();
     let (stretches, blank) = stretches(frames, sensor);
@@ -121,7 +121,7 @@ fn cut_up(frames: Vec<FrameRef>, film: Film, sensor: &Sensor) -> (Vec<View>, Vec
     (views, remarks)
 }
 
-/// Runs of frames that agree with their first; and why each of the frames in none is in none.
+/// Runs of frames that agree with their first frame, and why each other frame was rejected.
 fn stretches(frames: Vec<FrameRef>, sensor: &Sensor) -> (Vec<Vec<FrameRef>>, Vec<String>) {
     let table = sensor.code.table();
     let mut source = FrameSource::new(sensor.camera.width, sensor.camera.height);

@@ -1,4 +1,4 @@
-//! The folders that this process is filling, so that one that is interrupted can take them away.
+//! The folders that this process is filling, so that an interrupted run can remove them.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -8,25 +8,25 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 
-/// Beginning of the names of folders that are being filled, and of files that are being written.
+/// Prefix of the names of folders being filled and of files being written.
 pub(super) const UNFINISHED: &str = ".kinoise-";
 
-/// What an interruption found.
+/// What an interruption discarded and kept.
 #[derive(Debug, Default)]
 pub struct Interrupted {
-    /// Places that were to be written, and whether something stood there, which still does.
+    /// Places still to be written, and whether something existed there, which remains.
     pub discarded: Vec<(PathBuf, bool)>,
-    /// Places that were finished before.
+    /// Places finished before.
     pub kept: Vec<PathBuf>,
 }
 
-/// Throw away all folders that are not whole yet, for a process that ends at once: no other folder
-/// can be begun or finished after it.
+/// Discards all unfinished folders, for a process that exits at once: the register stays locked, so no other
+/// folder can be begun or finished afterwards.
 pub fn discard_unfinished() -> Interrupted {
     let mut register = register();
     let open = std::mem::take(&mut register.open);
     for open in &open {
-        // Other threads may still be writing: a file in its place keeps them from making it again.
+        // Other threads may still be writing: a file of this name keeps them from recreating the folder.
         let blocked = |staging: &Path| {
             let _ = fs::remove_dir_all(staging);
             fs::File::create_new(staging).is_ok()
@@ -43,22 +43,22 @@ pub fn discard_unfinished() -> Interrupted {
     Interrupted { discarded: open.into_iter().map(|o| (o.place, o.stood)).collect(), kept }
 }
 
-/// Each takes longer than making a folder.
+/// Each round takes longer than creating a folder.
 const MAX_ROUNDS: usize = 100;
-/// Every thread meets an error of its next write by then, and stops.
+/// By then every thread has failed at its next write and stopped.
 const SETTLING: Duration = Duration::from_millis(100);
 
-/// Remove a folder that is not whole, and the folders that were made for it.
+/// Removes an unfinished folder and the parent folders created for it.
 pub(super) fn discard(staging: &Path, parents: &[PathBuf]) {
     let _ = fs::remove_dir_all(staging);
-    // Fails, rightly, where something else stands in them by now.
+    // Fails, rightly, if something else is in them by now.
     parents.iter().for_each(|parent| drop(fs::remove_dir(parent)));
 }
 
-/// Have a folder for this run alone until what is returned is dropped, however the process ends: two
-/// would mix their files. An error of these words when another run has it.
+/// Locks a folder for this run until the returned file is dropped, however the process ends: two runs would
+/// mix their files. Fails with this message if another run holds the lock.
 pub(crate) fn lock(folder: &Path, [what, remedy]: [&'static str; 2]) -> Result<Option<fs::File>> {
-    // Some systems open no folder, and some network disks know no locks.
+    // Some systems cannot open folders, and some network disks have no locks.
     let Ok(file) = fs::File::open(folder) else { return Ok(None) };
     match file.try_lock() {
         Err(fs::TryLockError::WouldBlock) => Err(Error::recording(folder, what, remedy)),
@@ -66,13 +66,13 @@ pub(crate) fn lock(folder: &Path, [what, remedy]: [&'static str; 2]) -> Result<O
     }
 }
 
-/// A folder or a file is locked long before, should its process not be known.
+/// Age from which an unlocked entry of an unknown process is stale; a live run locks it much sooner.
 const STALE: Duration = Duration::from_secs(60);
 
-/// Remove from `parent` what runs left that were killed: nobody has it locked. What is set aside for
-/// somebody has an extension, and stays.
+/// Removes what killed runs left in `parent`: unlocked entries. Entries kept for the
+/// user have an extension and stay.
 pub fn discard_stale(parent: &Path) {
-    // What a name alone lies in.
+    // The parent of a bare name is empty.
     let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let entries = fs::read_dir(parent).into_iter().flatten().flatten();
     for entry in entries.filter(|e| e.file_name().to_string_lossy().starts_with(UNFINISHED)) {
@@ -90,13 +90,12 @@ pub fn discard_stale(parent: &Path) {
     }
 }
 
-/// How the name of what this process has not finished begins.
+/// Prefix of the names of this process's unfinished entries.
 pub(super) fn unfinished() -> String {
     format!("{UNFINISHED}{}-", std::process::id())
 }
 
-/// Is this the name of what a process had not finished that is no more? Where that cannot be told it is
-/// not.
+/// Whether this is the name of an unfinished entry whose process no longer exists; false if that is unknown.
 fn is_of_the_dead(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
     let id = name.strip_prefix(UNFINISHED).and_then(|rest| rest.split_once('-'));
@@ -105,24 +104,24 @@ fn is_of_the_dead(name: &OsStr) -> bool {
     processes.join("self").exists() && !processes.join(id.to_string()).exists()
 }
 
-/// Is `folder` part of an output that is not in its place yet?
+/// Whether `folder` is part of an output that is not in its place yet.
 pub(super) fn is_being_filled(folder: &Path) -> bool {
     register().open.iter().any(|open| folder.starts_with(&open.staging))
 }
 
-/// The folders of this process.
+/// The output folders of this process.
 pub(super) struct Register {
     pub open: Vec<Open>,
     pub finished: Vec<PathBuf>,
 }
 
 pub(super) struct Open {
-    /// Where it will stand.
+    /// Final path.
     pub place: PathBuf,
     pub staging: PathBuf,
-    /// Folders made for it, the innermost first.
+    /// Parent folders created for it, innermost first.
     pub parents: Vec<PathBuf>,
-    /// Something is at the place already.
+    /// Whether something already exists at the place.
     pub stood: bool,
 }
 

@@ -1,5 +1,4 @@
-//! Correspondences by the dozen: what each adds to the normal equations is summed side by side, in
-//! single precision, as the registers of a core hold it.
+//! Vectorised sums of correspondences into the normal equations, in SIMD lanes of single precision.
 //!
 //! A chunk of 2048 leaves a rounding error of 1e-6 of its sums, far below their noise; chunks are added
 //! in double precision.
@@ -11,11 +10,11 @@ use super::normal_equations::NormalEquations;
 use super::point::Point;
 use crate::stats::TUKEY;
 
-/// Two registers of plain x86-64 or aarch64, one of newer.
+/// Two registers of plain x86-64 or aarch64, one of newer cores.
 pub const LANES: usize = 8;
 type Lanes = [f32; LANES];
 
-/// 95 % as good as least squares where there are no outliers (Holland and Welsch 1977).
+/// Huber's threshold in sigmas: 95 % efficient where there are no outliers (Holland and Welsch 1977).
 const HUBER: f32 = 1.345;
 
 #[inline]
@@ -23,13 +22,14 @@ fn each(of: impl Fn(usize) -> f32) -> Lanes {
     std::array::from_fn(of)
 }
 
-/// Of the nine products of three numbers by three, or six by six, each once.
+/// Entries in the upper triangle of a symmetric 6 x 6 matrix.
 const PAIRS: usize = 21;
 
-/// Sums over correspondences, lane by lane; as in [`NormalEquations`].
+/// Sums over correspondences by lane, as in [`NormalEquations`].
 #[derive(Default)]
 pub struct Batch {
-    /// The moved points, what they are matched with and its normals, and the variance of each distance.
+    /// The moved points, the points they are matched with and their normals, and the variance of each
+    /// distance.
     at: [Lanes; 3],
     to: [Lanes; 3],
     normal: [Lanes; 3],
@@ -45,18 +45,18 @@ pub struct Batch {
     place_squared: Lanes,
     squares_m2: Lanes,
     correspondences: usize,
-    /// `None` where they are not asked for.
+    /// `None` where sizes are not requested.
     sizes: Option<Vec<f32>>,
 }
 
 impl Batch {
-    /// With room for the sizes of so many points, where they are asked for.
+    /// An empty batch; `sizes` is the number of points whose residual sizes to keep, if any.
     pub fn new(sizes: Option<usize>) -> Self {
         let sizes = sizes.map(|points| Vec::with_capacity(points + LANES));
         Batch { sizes, ..Batch::default() }
     }
 
-    /// A moved point, its neighbour, and the variance of the distance between them along the
+    /// Adds a moved point, its neighbour, and the variance of the distance between them along the
     /// neighbour's normal.
     #[inline]
     pub fn push(&mut self, at: &Vector3<f32>, to: &Point, variance: f32, robust: &Robust) {
@@ -110,7 +110,7 @@ impl Batch {
     pub fn finish(mut self, robust: &Robust) -> NormalEquations {
         let left = self.filled;
         for i in left..LANES {
-            // Adds nothing.
+            // Padding that adds nothing.
             [self.normal[0][i], self.normal[1][i], self.normal[2][i]] = [0.0; 3];
             self.variance[i] = f32::INFINITY;
         }
@@ -143,15 +143,15 @@ fn plus(sum: &mut Lanes, of: impl Fn(usize) -> f32) {
     }
 }
 
-/// How outliers fare.
+/// Robust weighting of outliers.
 pub struct Robust {
     pub kernel: Kernel,
-    /// Of weighted residuals that are no outliers.
+    /// Sigma of the inliers' weighted residuals.
     pub scale: f32,
 }
 
 impl Robust {
-    /// The weights `w2` with the kernel's, for weighted residuals of these squares.
+    /// The weights `w2` times those of the kernel, for the given squared weighted residuals.
     #[inline]
     fn weighted(&self, w2: &Lanes, squared: &Lanes) -> Lanes {
         let limit = |sigmas: f32| (sigmas * self.scale) * (sigmas * self.scale);
@@ -176,7 +176,7 @@ mod tests {
 
     use super::*;
 
-    /// Against one after the other in double precision; 2 x 8 and 3 that are left.
+    /// Compares with scalar sums in double precision, for two full batches and three more.
     #[test]
     fn side_by_side_is_as_one_by_one() {
         let wave = |i: usize, k: f32| (i as f32 * k).sin();

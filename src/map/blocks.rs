@@ -1,8 +1,8 @@
-//! Depth image -> a quarter of its width and height: each block of pixels becomes one point, far
-//! less noisy, with the normal of the blocks around it.
+//! Downsamples a depth image: each block of pixels becomes one point, far less noisy, with a normal from the
+//! blocks around it.
 //!
-//! All in inverse depth q = 1/z over the ray (x, y, 1): a plane is affine there,
-//! q = (n_x x + n_y y + n_z) / D, and a disparity sensor's noise is the same everywhere.
+//! All in inverse depth q = 1/z over the ray (x, y, 1): there a plane is affine,
+//! q = (n_x x + n_y y + n_z) / D, and the noise of a disparity sensor is uniform.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -10,24 +10,24 @@ use rayon::prelude::*;
 use super::point::{Noise, Point};
 use crate::camera::{Camera, Rays};
 
-/// Points in the order of a small image.
+/// The points of a downsampled depth image.
 pub struct Blocks {
-    /// Pixels a block, each way.
+    /// Side of a block, px.
     pub side_px: usize,
     pub points: Vec<Option<Point>>,
 }
 
-/// Blocks two apart differ by the slope of their surface too, by this share of their distance.
+/// Relative difference in inverse depth that the slope of a surface may make between blocks two apart.
 const SLOPE_AROUND: f32 = 0.05;
-/// Neighbours on each side for the normal.
+/// Blocks on each side used for the normal.
 const AROUND: usize = EDGE;
-/// Of the 25.
+/// Fewest blocks for a normal, of 25.
 const MIN_AROUND: f32 = 8.0;
-/// Surfaces seen at more than 80 degrees are rims and mistakes.
+/// Least cosine of incidence: surfaces seen at more than 80 degrees are rims and mistakes.
 const MIN_FACING: f32 = 0.17;
 
 impl Blocks {
-    /// Of a depth image, m, NaN where nothing was measured.
+    /// Downsamples a depth image, m, NaN where nothing was measured.
     pub fn of(depth: &[f32], camera: &Camera, rays: &Rays, side_px: usize, noise: &Noise) -> Self {
         let means = Means::of(depth, [camera.width, camera.height], rays, side_px, noise);
         let Means { width, height, .. } = means;
@@ -52,12 +52,12 @@ impl Blocks {
     }
 }
 
-/// Moments of the blocks around [`LANES`] blocks side by side, about each one's own mean.
+/// Moments of the neighbourhoods of [`LANES`] adjacent blocks, each about its own block's mean.
 struct Around {
-    /// n, x, y, xx, xy, yy, q, xq, yq; weighted with the pixels of each.
+    /// n, x, y, xx, xy, yy, q, xq, yq, weighted by the pixels of each block.
     sums: [[f32; LANES]; 9],
     found: [f32; LANES],
-    /// The mean's own x, y, q.
+    /// x, y, q of the block itself.
     centre: [[f32; LANES]; 3],
 }
 
@@ -68,7 +68,7 @@ fn lanes(values: &[f32], begin: usize) -> [f32; LANES] {
     lanes
 }
 
-/// A number a lane.
+/// One value per lane.
 #[inline]
 fn each(of: impl Fn(usize) -> f32) -> [f32; LANES] {
     std::array::from_fn(of)
@@ -109,7 +109,7 @@ impl Around {
         Around { sums, found, centre }
     }
 
-    /// (a, b, c) of q = a x + b y + c through the blocks around one.
+    /// Fits q = a x + b y + c to a block's neighbourhood; returns (a, b, c).
     fn plane(&self, lane: usize) -> Option<Vector3<f64>> {
         if self.found[lane] < MIN_AROUND {
             return None;
@@ -132,7 +132,7 @@ fn point(
     let [n, x, y, q, _] = means.planes.each_ref().map(|plane| plane[i]);
     let z = 1.0 / q;
     let at = Vector3::new(x * z, y * z, z);
-    // n / D of the plane; it looks away from the camera.
+    // The plane is n / D, which points away from the camera.
     let normal = -plane.try_normalize(f64::MIN_POSITIVE)?.cast::<f32>();
     let facing = -normal.dot(&at) / at.norm();
     if facing.is_nan() || facing <= MIN_FACING {
@@ -143,16 +143,16 @@ fn point(
     Some(Point { at, normal, sigma_axial, sigma_normal, pixel })
 }
 
-/// Blocks beyond the image on each side, all empty: who looks around needs no border.
+/// Empty blocks padded on each side of the image, so that neighbourhoods need no border check.
 pub const EDGE: usize = 2;
-/// Blocks worked on at once: their sums stay in the registers of any x86-64 or aarch64.
+/// Blocks processed at once: their sums stay in the registers of any x86-64 or aarch64.
 pub const LANES: usize = 4;
 
-/// Of a block: n pixels, x and y of the ray (x, y, 1), the inverse depth q along z, and the sigma of
-/// one inverse depth, faced squarely, 1/m. All zero where there is nothing.
+/// Mean of a block: n pixels, x and y of the ray (x, y, 1), the inverse depth q along z, and the sigma of a
+/// single inverse depth at normal incidence, 1/m. All zero where the block is empty.
 type Mean = [f32; 5];
 
-/// The means of all blocks, number by number, in rows of `stride` with an empty edge.
+/// The means of all blocks, one plane per number, in rows of `stride` with an empty edge.
 struct Means {
     width: usize,
     height: usize,
@@ -160,16 +160,16 @@ struct Means {
     planes: [Vec<f32>; 5],
 }
 
-/// Inverse depths on one surface differ by noise, up to this many sigma ...
+/// Inverse depths on one surface may differ by this many sigmas of noise ...
 pub const SIGMAS: f32 = 4.0;
-/// ... and by its slope: a block of 4 px at 525 px is 0.8 % of the distance wide, and 70 degrees
-/// make 2.7 times that, half to either side.
+/// ... and by this share for its slope: a block of 4 px at f = 525 px is 0.8 % of the distance wide, and a
+/// tilt of 70 degrees makes 2.7 times that, half to either side.
 const SLOPE: f32 = 0.012;
-/// A block with fewer pixels than this share is the rim of something.
+/// Least filled share of a block: less is the rim of something.
 const MIN_FILLED: f32 = 0.4;
 
 impl Means {
-    /// Of a depth image of `size`, m, NaN where nothing was measured.
+    /// Averages the blocks of a depth image, m, NaN where nothing was measured.
     fn of(
         depth: &[f32],
         [columns, rows]: [usize; 2],
@@ -195,7 +195,7 @@ impl Means {
         Means { width, height, stride, planes }
     }
 
-    /// Where a block's numbers are.
+    /// Index of a block in the planes.
     #[inline]
     fn index(&self, u: usize, v: usize) -> usize {
         (v + EDGE) * self.stride + u + EDGE
@@ -210,7 +210,7 @@ struct Picture<'a> {
     noise: &'a Noise,
 }
 
-/// Sums over the rows of a block, column by column: n, x, y, q, the least and the greatest q.
+/// Sums over the rows of a block, by column: n, x, y, q, and the least and greatest q.
 type Columns = [Vec<f32>; 6];
 
 impl Picture<'_> {
@@ -255,7 +255,7 @@ impl Picture<'_> {
         let low = low.iter().fold(f32::INFINITY, |l, &q| l.min(q));
         let high = high.iter().fold(0.0f32, |h, &q| h.max(q));
         let (sigma_q, tolerance) = self.tolerance(0.5 * (low + high));
-        // Mostly all is one surface.
+        // Most blocks show one surface.
         if high - low <= tolerance {
             let [x, y, q] = [x, y, q].map(|values| values.iter().sum::<f32>() / n);
             return [n, x, y, q, sigma_q];
@@ -263,7 +263,7 @@ impl Picture<'_> {
         self.larger_part([u, v], scratch)
     }
 
-    /// Where a block shows more than one surface, the median stands on the larger part.
+    /// Mean of the larger surface in a block that shows more than one, which is where the median lies.
     fn larger_part(&self, [u, v]: [usize; 2], scratch: &mut Vec<f32>) -> Mean {
         let side = self.side;
         let pixels = || {
@@ -291,7 +291,7 @@ impl Picture<'_> {
         MIN_FILLED * (self.side * self.side) as f32
     }
 
-    /// Sigma of one inverse depth, and how far others of its surface may be from it, 1/m.
+    /// Sigma of one inverse depth, and the largest difference of others on its surface, 1/m.
     fn tolerance(&self, q: f32) -> (f32, f32) {
         let sigma_q = self.noise.sigma_facing(1.0 / q) * q * q;
         (sigma_q, SIGMAS * sigma_q + SLOPE * q)

@@ -1,4 +1,4 @@
-//! What became of each frame, what it cost, and what was odd about the lot.
+//! Result and timing of each frame, and remarks on all of them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use crate::units::verb;
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fate {
-    /// The map's frame is this camera's.
+    /// The first frame; its camera frame is the map frame.
     First,
     Tracked,
     /// No pose, and why.
@@ -25,15 +25,15 @@ pub enum Fate {
 pub struct FrameReport {
     pub stamp: f64,
     pub fate: Fate,
-    /// Where the camera was, `map_from_camera`; `None` when lost.
+    /// Camera pose, `map_from_camera`; `None` when lost.
     pub pose: Option<Isometry3<f64>>,
-    /// Where features of the colour images alone say that it was, at the colour image's own stamp.
+    /// Pose from features of the colour images alone, at the colour image's own stamp.
     pub by_colour: Option<Pose>,
-    /// Of every frame that was aligned, whether the result was believed or not.
+    /// Present for every frame that was aligned, whether the result was accepted or not.
     pub alignment: Option<Alignment>,
-    /// Is the depth image the one before, bit by bit?
+    /// Whether the depth image is bit-identical to that of the last frame with a pose.
     pub repeated: bool,
-    /// What was odd about its files.
+    /// A problem with its files.
     pub remark: Option<String>,
     pub stages: Stages,
 }
@@ -53,13 +53,13 @@ impl FrameReport {
         }
     }
 
-    /// The alignment that its pose comes from.
+    /// The alignment that gave the pose.
     fn tracked(&self) -> Option<&Alignment> {
         self.alignment.as_ref().filter(|_| self.fate == Fate::Tracked)
     }
 }
 
-/// Milliseconds by the name of what took them, in order of first appearance.
+/// Milliseconds by stage name, in order of first appearance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Stages(Vec<(&'static str, f64)>);
 
@@ -69,7 +69,7 @@ impl Stages {
         let done = work();
         let ms = begin.elapsed().as_secs_f64() * 1e3;
         match self.0.iter_mut().find(|(known, _)| *known == name) {
-            // Done twice for one frame.
+            // A stage may run twice for one frame.
             Some((_, sum)) => *sum += ms,
             None => self.0.push((name, ms)),
         }
@@ -84,7 +84,7 @@ impl Stages {
         self.0.iter().map(|(_, ms)| ms).sum()
     }
 
-    /// The median of each stage over frames.
+    /// Median of each stage over frames.
     pub fn medians(all: &[Stages]) -> Stages {
         let mut lists: Vec<(&'static str, Vec<f64>)> = Vec::new();
         for (name, ms) in all.iter().flat_map(Stages::each) {
@@ -97,10 +97,10 @@ impl Stages {
     }
 }
 
-/// A camera that never went farther than this was not moved, m: a tenth of a Kinect's noise.
+/// A camera that never went farther than this did not move, m: a tenth of a Kinect's noise.
 const STILL_M: f64 = 2e-4;
 
-/// What was odd, in sentences.
+/// Remarks on oddities, in sentences.
 pub fn remarks(frames: &[FrameReport]) -> Vec<String> {
     [lost(frames), degenerate(frames), repeated(frames), still(frames)]
         .into_iter()
@@ -108,7 +108,7 @@ pub fn remarks(frames: &[FrameReport]) -> Vec<String> {
         .collect()
 }
 
-/// A film whose clocks disagree: its depth and its colour are not of the same moment.
+/// Remark on a film whose clocks disagree, so that depth and colour are not from the same moment.
 pub fn clocks(offset: &ClockOffset) -> String {
     let [ms, error] = [offset.seconds.abs(), offset.std_error_s].map(|s| 1e3 * s);
     let way = if offset.seconds > 0.0 { "late" } else { "early" };
@@ -177,8 +177,8 @@ fn still(frames: &[FrameReport]) -> Option<String> {
     (frames.len() > 1 && far < STILL_M).then(|| "the camera never moved".to_string())
 }
 
-/// The table frames.csv, a row a frame: fate, standard deviations of the pose (m and rad),
-/// iterations, share of points with a neighbour, and what depth does not determine.
+/// The table frames.csv, one row per frame: fate, standard deviations of the pose (m and rad),
+/// iterations, share of points with a neighbour, pairs, their rms, and what depth does not determine.
 pub fn frames_csv(frames: &[FrameReport]) -> String {
     let mut text = String::from(
         "timestamp,fate,sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_rad,sigma_ry_rad,sigma_rz_rad,iterations,matched,pairs,rms_m,weakest,undetermined\n",

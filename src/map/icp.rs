@@ -1,9 +1,8 @@
-//! Point-to-plane ICP, linearised for small angles (Chen and Medioni 1992). The loop is written once;
-//! what is a neighbour ([`Target`]), what a correspondence weighs ([`Weights`]) and how outliers fare
-//! ([`Kernel`]) are slots.
+//! Point-to-plane ICP, linearised for small angles (Chen and Medioni 1992). One loop serves all choices of
+//! neighbours ([`Target`]), weights ([`Weights`]) and robust kernels ([`Kernel`]).
 //!
 //! ```text
-//! cost(M) = sum (((M s - d) . n) w)^2        s of the source moves, d and its normal n stand
+//! cost(M) = sum (((M s - d) . n) w)^2        s of the source moves, d and its normal n are fixed
 //! ```
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
@@ -15,11 +14,11 @@ use super::point::{Motion, Point};
 use super::{Kernel, Method, Options, Weights};
 
 pub trait Target: Sync {
-    /// What a search leaves behind for the next search of the same point.
+    /// Result of a search, kept for the next search of the same point.
     type Cache: Default + Clone + Send;
-    /// The neighbour of a place, in the target's frame.
+    /// The neighbour of a place, in the target frame.
     fn find(&self, p: &Vector3<f32>, cache: &mut Self::Cache) -> Option<&Point>;
-    /// Width of what one point stands for at a depth of 1 m, m; `Some` switches the `Gate` on.
+    /// Width of the area that one point represents at a depth of 1 m, m; `Some` enables the `Gate`.
     fn block_width(&self) -> Option<f32> {
         None
     }
@@ -34,35 +33,35 @@ pub enum Termination {
     TooFewCorrespondences,
 }
 
-/// Where the moving points are in the target's frame, and how well that is known.
+/// Pose of the source points in the target frame, and its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alignment {
     pub target_from_source: Isometry3<f64>,
-    /// Of (shift, turn) about the target's origin, m and rad, its errors taken as independent.
+    /// Covariance of (shift, turn) about the target's origin, m and rad, with errors taken as independent.
     pub covariance: Matrix6<f64>,
     pub iterations: usize,
     pub termination: Termination,
-    /// Share of the moving points that have a neighbour, before the `Gate`.
+    /// Share of the source points that have a neighbour, before the `Gate`.
     pub inlier_ratio: f64,
-    /// Pairs of the last round; `covariance` and `rms_m` are theirs.
+    /// Pairs of the last round, on which `covariance` and `rms_m` are based.
     pub correspondences: usize,
-    /// The distances along the normals over what their weights expect, as a robust sigma: 1 where the
-    /// noise model says all. Of the pairs before the `Gate`.
+    /// Robust sigma of the distances along the normals over their expected sigmas, before the `Gate`: 1 where
+    /// the noise model explains all.
     pub misfit: f64,
     /// Root mean square of the distances along the normals, m; `None` without correspondences.
     pub rms_m: Option<f64>,
-    /// Motions that the correspondences do not determine; along them the start was kept.
+    /// Motions that the correspondences do not determine; along them the start pose was kept.
     pub degenerate_directions: Vec<Direction>,
-    /// The least determined motion's share of what the best has: 0 is none at all.
+    /// [`Direction::information`] of the least determined motion: 0 is none at all.
     pub min_information: f64,
 }
 
-/// Fewer say nothing about six numbers under noise.
+/// Fewest pairs: fewer do not determine six parameters under noise.
 const MIN_CORRESPONDENCES: usize = 50;
-/// Points a task: sums are added in this order whatever the number of threads.
+/// Points per task: sums are added in this order, independent of the number of threads.
 const CHUNK: usize = 2048;
 
-/// Align `source` to `target`, from `start`.
+/// Aligns `source` to `target`, from `start`.
 pub fn align<T: Target>(
     source: &[Point],
     target: &T,
@@ -107,8 +106,8 @@ pub fn align<T: Target>(
             last = None;
             break;
         };
-        // The first round's residuals hold the motion itself: only from the second on is what
-        // stands out an outlier.
+        // The residuals of the first round contain the motion itself; only from the second on do
+        // large ones mean outliers.
         if sizes {
             scale = equations.robust_sigma();
         }
@@ -116,7 +115,7 @@ pub fn align<T: Target>(
         if gate.is_none() {
             (misfit, inlier_ratio) = (scale, here);
         } else if here < MIN_GATED * inlier_ratio {
-            // What is left is too little of the picture.
+            // The gate leaves too little of the picture.
             (gate, block_width) = (None, None);
             continue;
         }
@@ -124,7 +123,7 @@ pub fn align<T: Target>(
         pose = renormalised(&(moved(&step) * pose));
         let (shift, turn) = (step.fixed_rows::<3>(0).norm(), step.fixed_rows::<3>(3).norm());
         last = Some((equations, solution));
-        // Near the goal, and with all points, the misfit is the noise's.
+        // Near convergence, and with all points, the misfit measures the noise.
         let settled = near && !coarse && gate.is_none();
         if let Some(width) = block_width.filter(|_| settled) {
             gate = Some(Gate::of(options.max_correspondence_m, misfit, width));
@@ -138,17 +137,17 @@ pub fn align<T: Target>(
     Alignment { termination, iterations, misfit, inlier_ratio, ..Alignment::of(pose, last) }
 }
 
-/// The points of the first rounds: far from the goal a few tell the way as well as all. The paper's
-/// method goes without.
+/// Subset of points for the first rounds, which far from the goal serves as well as all. Not used by the
+/// paper's method.
 struct Few {
     points: Vec<Point>,
-    /// From here on it takes all.
+    /// Whether all points are used from now on.
     enough: bool,
 }
 
-/// One in so many.
+/// The subset has one point in this many.
 const FEW: usize = 4;
-/// Steps below this, m and rad, are fine ones.
+/// Steps below this, m and rad, are near convergence.
 const NEAR: f64 = 1e-3;
 
 impl Few {
@@ -159,25 +158,25 @@ impl Few {
     }
 }
 
-/// How far apart a pair may be once the motion is nearly found.
+/// Largest distance within a pair once the motion is nearly found.
 ///
-/// Where the noise model explains the residuals, all pairs within the greatest distance count. Where it
-/// does not (other surfaces beside the right one, a rolling shutter), only the nearer ones do: those
-/// within that distance times [`SOUND_MISFIT`] / misfit. What it is worth: reports/maps.
+/// Where the noise model explains the residuals, all pairs within the maximum distance count. Where it
+/// does not (other surfaces beside the right one, a rolling shutter), only those within that distance times
+/// [`SOUND_MISFIT`] / misfit do. For its benefit see reports/maps.
 #[derive(Debug, Clone, Copy)]
 struct Gate {
     /// m.
     distance: f32,
-    /// A pair by projection is up to about a block apart: so much at a depth of 1 m.
+    /// Width of a block at a depth of 1 m, m: pairs by projection are up to about a block apart.
     block_width: f32,
 }
 
-/// Misfit of a film whose noise model is right, a Kinect's steps in it: 1.31 to 1.41 in a simulated
-/// room. Real films have 3 to 8 with the paper's Eq. 1.
+/// Upper limit of the misfit under a correct noise model, with a Kinect's quantisation: 1.31 to 1.41 in a
+/// simulated room. Real films have 3 to 8 with the paper's Eq. 1.
 pub const SOUND_MISFIT: f64 = 1.45;
-/// No nearer than this share of the greatest distance: chosen on fr1_rpy of .2 to .4 (reports/maps).
+/// Least gate, as a share of the maximum distance: chosen on fr1_rpy among 0.2 to 0.4 (reports/maps).
 const MIN_GATE: f64 = 0.2;
-/// Where fewer of the pairs are left, as a share, the gate is dropped.
+/// The gate is dropped where a smaller share of the pairs is left.
 const MIN_GATED: f64 = 0.3;
 
 impl Gate {
@@ -186,7 +185,7 @@ impl Gate {
         Gate { distance: max_m * share as f32, block_width }
     }
 
-    /// A point at a depth, m, and one so far from it, squared.
+    /// Whether a pair passes, given the depth of its point, m, and its squared distance.
     #[inline]
     fn passes(&self, depth: f32, squared: f32) -> bool {
         let max = self.distance.max(self.block_width * depth);
@@ -194,20 +193,20 @@ impl Gate {
     }
 }
 
-/// exp of a small motion: shift and turn about the target's origin.
+/// Motion of a small step: shift and rotation vector about the target's origin.
 fn moved(step: &nalgebra::Vector6<f64>) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(step.fixed_rows::<3>(3).into_owned());
     Isometry3::from_parts(Translation3::from(step.fixed_rows::<3>(0).into_owned()), turn)
 }
 
-/// A product of rotations is one but for rounding, which products of products double each time.
+/// Renormalises the rotation: rounding errors grow with each product of products.
 pub fn renormalised(pose: &Isometry3<f64>) -> Isometry3<f64> {
     let rotation = UnitQuaternion::new_normalize(pose.rotation.into_inner());
     Isometry3::from_parts(pose.translation, rotation)
 }
 
 impl Alignment {
-    /// By the last round's sums, if it had any; the rest is the caller's.
+    /// From the sums of the last round, if any; the caller sets the other fields.
     fn of(pose: Isometry3<f64>, last: Option<(NormalEquations, Solution)>) -> Self {
         let (equations, solution) = last.unzip();
         let correspondences = equations.as_ref().map_or(0, |e| e.correspondences);
@@ -231,10 +230,10 @@ struct Round<'a, T> {
     target: &'a T,
     options: &'a Options,
     pose: &'a Isometry3<f64>,
-    /// Of weighted residuals that are no outliers.
+    /// Sigma of the inliers' weighted residuals.
     scale: f64,
     gate: Option<Gate>,
-    /// Whether the residuals' sizes are kept.
+    /// Whether the sizes of the residuals are kept.
     sizes: bool,
 }
 
@@ -263,7 +262,7 @@ impl<T: Target> Round<'_, T> {
         parts.into_iter().fold(NormalEquations::default(), NormalEquations::plus)
     }
 
-    /// One over what the square of a residual weighs.
+    /// Variance of a residual: one over the weight of its square.
     #[inline]
     fn variance(&self, s: &Point, d: &Point) -> f32 {
         match self.options.weights {

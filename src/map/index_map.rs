@@ -1,4 +1,4 @@
-//! Neighbours by projection: the neighbour of a point is what its own pixel saw, no search.
+//! Projective data association: the neighbour of a point is what its own pixel saw, without a search.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -7,18 +7,18 @@ use super::icp::Target;
 use super::point::{Motion, Point};
 use crate::camera::{Camera, lens};
 
-/// Two places may be one surface when they are no more than this many standard deviations apart.
+/// Two places may be one surface when they are at most this many standard deviations apart.
 pub const SIGMAS: f32 = 4.0;
-/// What hides is nearer by at least this: a block of a slanted surface is as deep, m.
+/// An occluder is nearer by at least this, m: the depth range within a block of a slanted surface.
 const HIDES_M: f32 = 0.03;
-/// Nothing is measured nearer, m.
+/// Least measurable depth, m.
 const MIN_DEPTH_M: f32 = 0.2;
 
 /// The points of one image, found by projection.
 pub struct Projective<'a> {
     grid: BlockGrid,
     points: &'a [Option<Point>],
-    /// Neighbours farther than this do not count, m.
+    /// Largest distance of a neighbour, m.
     max_correspondence_m: f32,
 }
 
@@ -38,13 +38,13 @@ impl Target for Projective<'_> {
     }
 }
 
-/// The point, unless it is farther from `p` than `max_m`.
+/// Returns the point, unless it is farther from `p` than `max_m`.
 #[inline]
 pub fn within<'a>(point: &'a Point, p: &Vector3<f32>, max_m: f32) -> Option<&'a Point> {
     ((point.at - p).norm_squared() <= max_m * max_m).then_some(point)
 }
 
-/// Where points of the camera's frame fall in its image of blocks.
+/// Projects points in the camera frame to blocks of its image.
 struct BlockGrid {
     /// In blocks.
     focal: [f32; 2],
@@ -84,19 +84,19 @@ impl BlockGrid {
     }
 }
 
-/// Which points of a map a camera sees: the front-most of each block of its image.
+/// The points of a map that a camera sees: the front-most of each block of its image.
 pub struct IndexMap<'a> {
     pub camera: &'a Camera,
     grid: BlockGrid,
     camera_from_map: Motion,
-    /// Index of the point that a block shows, [`NONE`] where it shows none.
+    /// Index of the point that each block shows, or [`NONE`].
     front: Vec<u32>,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl<'a> IndexMap<'a> {
-    /// Render `points`, of the map's frame.
+    /// Renders `points`, given in the map frame.
     pub fn render<'p>(
         points: impl Iterator<Item = &'p Point>,
         map_from_camera: &Isometry3<f64>,
@@ -112,7 +112,7 @@ impl<'a> IndexMap<'a> {
                 continue;
             }
             let Some(block) = grid.block(&at) else { continue };
-            // From behind it is not seen.
+            // Surfaces are not visible from behind.
             if camera_from_map.turned(&point.normal).dot(&at) < 0.0 {
                 front[block].meet(Front { z: at.z, sigma: point.sigma_normal, index: i as u32 });
             }
@@ -126,7 +126,7 @@ impl<'a> IndexMap<'a> {
         1.0 / self.grid.focal[0]
     }
 
-    /// The block that a place of the map's frame falls in.
+    /// The block that a place in the map frame projects to.
     #[inline]
     pub fn block(&self, at: &Vector3<f32>) -> Option<usize> {
         self.grid.block(&self.camera_from_map.moved(at))
@@ -138,7 +138,7 @@ impl<'a> IndexMap<'a> {
         (index != NONE).then_some(index as usize)
     }
 
-    /// What a block and its eight neighbours show, row by row.
+    /// The points that a block and its eight neighbours show, row by row.
     pub fn around(&self, block: usize) -> impl Iterator<Item = usize> + '_ {
         let BlockGrid { width, height, .. } = self.grid;
         let (u, v) = (block % width, block / width);
@@ -150,7 +150,7 @@ impl<'a> IndexMap<'a> {
     }
 }
 
-/// The point that a block shows, while they are rendered.
+/// The point that a block shows so far, while rendering.
 #[derive(Debug, Clone, Copy)]
 struct Front {
     z: f32,
@@ -161,8 +161,8 @@ struct Front {
 impl Front {
     const NOTHING: Self = Front { z: f32::INFINITY, sigma: f32::INFINITY, index: NONE };
 
-    /// The nearer hides the farther; of two that may be one surface the surer shows. (The nearer of
-    /// those would be the one with the greater error: the map would come towards the camera.)
+    /// The nearer point hides the farther; of two that may be one surface, the one with the smaller sigma
+    /// shows. (Choosing the nearer would select errors towards the camera and shift the map that way.)
     fn meet(&mut self, other: Front) {
         let apart = SIGMAS * joint(self.sigma.min(1.0), other.sigma) + HIDES_M;
         let nearer = other.z < self.z - apart;
@@ -173,7 +173,7 @@ impl Front {
     }
 }
 
-/// Standard deviation of the difference of two.
+/// Standard deviation of the difference of two independent values.
 #[inline]
 pub fn joint(a: f32, b: f32) -> f32 {
     (a * a + b * b).sqrt()

@@ -1,5 +1,5 @@
-//! The finished map: its points, the PLY file, and the points of all frames averaged in cells, for
-//! the methods that keep no surfels.
+//! The finished map: its points, the PLY file, and a grid that averages the points of all frames, for the
+//! methods without surfels.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -11,14 +11,14 @@ pub struct MapPoint {
     /// m, in the frame of the first camera.
     pub at: Vector3<f32>,
     pub normal: Vector3<f32>,
-    /// Of its place along its normal, m.
+    /// Standard deviation along the normal, m.
     pub sigma: f32,
-    /// Red, green, blue; grey where no colour was seen.
+    /// Red, green, blue; grey without colour.
     pub colour: [u8; 3],
 }
 
-/// The map as a PLY file, binary and little-endian, as MeshLab and CloudCompare read it: places,
-/// normals, colours and `sigma`, m.
+/// The map as a binary little-endian PLY file, as MeshLab and CloudCompare read it: positions, normals,
+/// colours and `sigma`, m.
 pub fn ply(points: &[MapPoint]) -> Vec<u8> {
     let header = format!(
         "ply\nformat binary_little_endian 1.0\ncomment kinoise map; metres; frame of the first camera\n\
@@ -43,10 +43,10 @@ pub fn ply(points: &[MapPoint]) -> Vec<u8> {
 
 /// Side of a cell, m.
 const SIDE_M: f32 = 0.03;
-/// For what was never seen in colour.
+/// Colour of points never seen in colour.
 const GREY: [u8; 3] = [160; 3];
 
-/// Means weighted by information, 1 / sigma^2.
+/// Means of points in cells, weighted by information, 1 / sigma^2.
 #[derive(Debug, Clone, Default)]
 pub struct PointGrid {
     cells: SparseGrid,
@@ -56,7 +56,7 @@ pub struct PointGrid {
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
     information: f32,
-    /// Relative to the first point that fell in, weighted.
+    /// Weighted sum relative to the first point in the cell.
     off: Vector3<f32>,
     first: Vector3<f32>,
     normal: Vector3<f32>,
@@ -102,7 +102,7 @@ pub fn colour_of(rgb: &[u8], pixel: u32) -> Vector3<f32> {
     Vector3::new(rgb[i], rgb[i + 1], rgb[i + 2]).map(f32::from)
 }
 
-/// Of a sum of `n` colours; grey of none.
+/// Mean of `n` colours from their sum; grey for none.
 pub fn mean_colour(sum: Vector3<f32>, n: f32) -> [u8; 3] {
     if n > 0.0 { [0, 1, 2].map(|k| (sum[k] / n).round().clamp(0.0, 255.0) as u8) } else { GREY }
 }

@@ -1,4 +1,4 @@
-//! The mapper: where the camera was and what it saw, from depth images and a noise model.
+//! The mapper: the trajectory of the camera and a map, from depth images and a noise model.
 //!
 //! ```text
 //! Sequence -preprocess-> points with normals and sigmas -start-> -align-> pose -fuse-> map
@@ -46,10 +46,10 @@ use crate::trajectory::Pose;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mapped {
-    /// One a depth image, in time order.
+    /// One per depth image, in time order.
     pub frames: Vec<FrameReport>,
     pub map: Vec<MapPoint>,
-    /// What was odd, in sentences.
+    /// Remarks on oddities, in sentences.
     pub remarks: Vec<String>,
 }
 
@@ -60,11 +60,11 @@ impl Mapped {
         self.frames.iter().filter_map(pose).collect()
     }
 
-    /// What the colour images' clock lacks of the depth images', by how each sees the camera turn.
-    /// `None` without [`Init::Orb`], and where the camera turned too little to tell.
+    /// Offset to add to the colour images' stamps to match the depth images', from how each sees the camera
+    /// turn. `None` without [`Init::Orb`], and where the camera turned too little.
     pub fn clock_offset(&self) -> Option<ClockOffset> {
         let by_colour: Vec<Pose> = self.frames.iter().filter_map(|f| f.by_colour).collect();
-        // The map's trajectory is smooth enough to be interpolated; that of the features is not.
+        // The map's trajectory is smooth enough to interpolate; that of the features is not.
         clock_offset(&self.trajectory(), &by_colour)
     }
 
@@ -74,12 +74,12 @@ impl Mapped {
     }
 }
 
-/// Frames prepared at once: whichever thread is done with one takes the next, and none waits for long.
+/// Frames prepared in parallel, enough that no thread waits for long.
 const AHEAD: usize = 4;
 
-/// Map a sequence. Whether the model is this sensor's is the caller's to ask:
+/// Maps a sequence. The caller checks whether the model fits this sensor:
 /// [`NoiseModel::differences`] and [`outside`].
-/// An error when the model is of another sensor, OpenCV fails, or not even two frames have a pose.
+/// Fails when the model is of another sensor, OpenCV fails, or fewer than two frames have a pose.
 pub fn map(
     sequence: &Sequence,
     model: &NoiseModel,
@@ -97,7 +97,7 @@ pub fn map(
     let mut ready = prepare(blocks.peek().copied());
     while let Some(block) = blocks.next() {
         let prepared = std::mem::take(&mut ready);
-        // The next frames are read while these are aligned, one after the other.
+        // The next frames are read while these are aligned in order.
         let align = || -> Result<Vec<FrameReport>> {
             let each = |(moment, frame): (&Moment, _)| tracker.track(moment.stamp, frame);
             block.iter().zip(prepared).map(each).collect()
@@ -145,36 +145,36 @@ pub enum Method {
     Model,
 }
 
-/// Where an alignment starts from.
+/// Start of an alignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Init {
-    /// Where the last frame was.
+    /// The pose of the last frame.
     None,
-    /// As the last two frames moved.
+    /// Constant velocity: the motion between the last two frames.
     Motion,
-    /// Where ORB features say.
+    /// The motion by ORB features.
     Orb,
 }
 
-/// What a correspondence weighs.
+/// Weight of a correspondence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weights {
-    /// All the same.
+    /// All equal.
     None,
-    /// The paper's: 1 / sigma(d_z, theta) of the target's point.
+    /// The paper's: 1 / sigma(d_z, theta) of the target point.
     Model,
-    /// One over the joint standard deviation of both points along the normal, averaged as they are.
+    /// One over the joint standard deviation of both (averaged) points along the normal.
     Both,
 }
 
-/// How residuals far beyond the usual count.
+/// Robust kernel: how large residuals count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kernel {
-    /// As any other.
+    /// By their square, like all others.
     Square,
-    /// With their size, not its square.
+    /// By their size instead of its square.
     Huber,
-    /// Less and less, then not at all.
+    /// Less and less, and finally not at all.
     Tukey,
 }
 
@@ -186,20 +186,20 @@ pub struct Options {
     pub init: Init,
     pub voxel_m: f32,
     pub block_px: usize,
-    /// Neighbours farther than this are none, m.
+    /// Largest distance of a neighbour, m.
     pub max_correspondence_m: f32,
     pub max_iterations: usize,
-    /// ICP has converged when a step is below both: m and rad.
+    /// ICP has converged when a step is below both, m and rad.
     pub min_shift_m: f64,
     pub min_turn_rad: f64,
-    /// Surfaces that lean more to each other are not one: cosine between their normals.
+    /// Least cosine between the normals of a pair.
     pub min_cosine: f64,
     /// Observations of a surfel that count at most.
     pub max_observations: f32,
-    /// A frame of which a smaller share of points has a neighbour is lost.
+    /// A frame with a smaller share of points with a neighbour is lost.
     pub min_inlier_ratio: f64,
-    /// From the first row of a depth image to the last, s; 0 where all are seen at once. The paper's
-    /// method has no use for it.
+    /// Time from the first row of a depth image to the last, s; 0 for a global shutter. Not used by the
+    /// paper's method.
     pub readout_s: f64,
     pub seed: Seed,
     /// Read colour for the map.
@@ -216,7 +216,7 @@ impl Options {
             init,
             voxel_m: 0.03,
             block_px: 4,
-            // Not in the paper: what its peers are run with.
+            // Not in the paper; the value that its peers are run with.
             max_correspondence_m: 0.1,
             max_iterations: 30,
             min_shift_m: 1e-8,
@@ -230,7 +230,7 @@ impl Options {
         }
     }
 
-    /// What was measured to be best.
+    /// The options measured to be best.
     pub fn best() -> Self {
         Options {
             method: Method::Model,
@@ -243,24 +243,24 @@ impl Options {
     }
 }
 
-/// Alignments of real films settle within 30 (the paper's limit); one that has not by now never does.
+/// Alignments of real films converge within 30 (the paper's limit); one that has not by now never does.
 pub const MAX_ITERATIONS: usize = 1000;
-/// A surfel is observed once a frame: an hour at 30 Hz.
+/// A surfel is observed once per frame: an hour at 30 Hz.
 pub const MAX_OBSERVATIONS: f32 = 108_000.0;
-/// Sides of a voxel, from a depth image's grain to a room in a few of them, m.
+/// Accepted sides of a voxel, m: from a depth image's resolution to a few for a room.
 pub const VOXEL_M: [f64; 2] = [0.002, 1.0];
-/// Beyond it a block is the whole picture of a small sensor.
+/// Beyond this a block is the whole image of a small sensor.
 pub const MAX_BLOCK_PX: usize = 32;
-/// Distances in a pair of points, from the grain to those of other things, m.
+/// Accepted largest distances within a pair, m: from a depth image's resolution to those between objects.
 pub const GATE_M: [f64; 2] = [0.001, 2.0];
-/// No shutter takes longer for a picture, s.
+/// Longest readout of any shutter, s.
 pub const MAX_READOUT_S: f64 = 1.0;
 
-/// Frames that stand for a film when its depths are asked for.
+/// Frames sampled from a film to find its depths.
 const SAMPLED: usize = 8;
 
-/// Share of the sequence's depths that lie outside the distances at which `model` was measured, where
-/// its sigma is held; of a few frames over the whole. `None` where those show no depth.
+/// Share of the sequence's depths outside the distances at which `model` was measured, where its sigma is
+/// held constant; from a few frames spread over the whole. `None` where those show no depth.
 pub fn outside(sequence: &Sequence, model: &NoiseModel) -> Option<f64> {
     let table = sequence.sensor.code.table();
     let [near, far] = model.sigma.domain.z_m;

@@ -1,8 +1,8 @@
-//! The nearest neighbour, exactly: points in the cells of a grid, and what is known from the last time.
+//! Exact nearest neighbours: points in the cells of a grid, and a cache of the last search.
 //!
 //! Between two steps of ICP a point hardly moves. If its nearest neighbour was at distance `a` and
-//! every other at `b` or more, it stays the nearest until the point has moved by (b - a) / 2: the
-//! triangle inequality saves the search without an approximation.
+//! every other at `b` or more, it stays the nearest until the point has moved by (b - a) / 2: by the
+//! triangle inequality the search can be skipped without an approximation.
 
 use nalgebra::Vector3;
 
@@ -15,16 +15,16 @@ use super::sparse_grid::{Cell, SparseGrid, cell_of};
 pub struct Nearest {
     points: Vec<Point>,
     grid: SparseGrid,
-    /// The first point of each cell; of a voxel grid's points most cells hold one.
+    /// The first point of each cell; most cells of a voxel grid's points hold one.
     heads: Vec<Entry>,
-    /// The others.
+    /// The other points.
     rest: Vec<Entry>,
     side_m: f32,
-    /// Neighbours farther than this do not count, m.
+    /// Largest distance of a neighbour, m.
     max_correspondence_m: f32,
 }
 
-/// A point where a search passes by.
+/// A point as a search reads it.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     at: Vector3<f32>,
@@ -35,11 +35,11 @@ struct Entry {
 
 const NONE: u32 = u32::MAX;
 
-/// What a search leaves behind for the next search of the same point.
+/// Result of a search, kept for the next search of the same point.
 #[derive(Debug, Clone, Copy)]
 pub struct NeighbourCache {
     at: Vector3<f32>,
-    /// How far the point may move before it must be searched for again, m; below 0 where it never was.
+    /// Distance the point may move before a new search is needed, m; below 0 before the first search.
     safe_radius: f32,
     found: Option<u32>,
 }
@@ -61,7 +61,7 @@ impl Search {
     const NOTHING: Self = Search { nearest: None, best: f32::INFINITY, second: f32::INFINITY };
 }
 
-/// Of a cell's side, how much farther a search looks than it must: less is sooner repeated.
+/// Extra reach of a search, as a share of the cell's side: with less, it is repeated sooner.
 const MARGIN: f32 = 0.2;
 
 impl Nearest {
@@ -87,7 +87,7 @@ impl Nearest {
         &self.points
     }
 
-    /// What is nearest to a place, and how far it may move until that is asked again.
+    /// Finds the nearest point, and how far the place may move until a new search is needed.
     fn search(&self, p: &Vector3<f32>, last: &NeighbourCache) -> NeighbourCache {
         let cell = cell_of(p, 1.0 / self.side_m);
         let known = match last.found {
@@ -98,13 +98,13 @@ impl Nearest {
         if nearest <= self.max_correspondence_m {
             self.search_within(p, nearest + MARGIN * self.side_m)
         } else {
-            // What had no neighbour mostly has none still: all that is near enough is looked at once.
+            // A point that had no neighbour mostly still has none: search the whole reach at once.
             let none = last.found.is_none() && last.safe_radius >= 0.0;
             self.search_outwards(p, cell, if none { i32::MAX } else { 1 })
         }
     }
 
-    /// All cells as near as that.
+    /// Searches all cells within `reach`, m.
     fn search_within(&self, p: &Vector3<f32>, reach: f32) -> NeighbourCache {
         let mut search = Search::NOTHING;
         let corner = |sign: f32| cell_of(&p.map(|v| v + sign * reach), 1.0 / self.side_m);
@@ -113,9 +113,9 @@ impl Nearest {
         self.remember(p, &search, reach)
     }
 
-    /// Box after larger box of cells, until none that is left can hold a nearer point.
+    /// Searches growing boxes of cells, until no cell outside can hold a nearer point.
     fn search_outwards(&self, p: &Vector3<f32>, cell: Cell, begin: i32) -> NeighbourCache {
-        // From the point to the border of its own cell; a shell more is a side more.
+        // Distance from the point to the border of its own cell; each shell adds a side.
         let inside = (0..3)
             .map(|k| {
                 let from = p[k] - cell[k] as f32 * self.side_m;
@@ -123,7 +123,7 @@ impl Nearest {
             })
             .fold(f32::INFINITY, f32::min)
             .max(0.0);
-        // As many shells as show all that counts, and a margin.
+        // Enough shells for the largest distance.
         let last = (self.max_correspondence_m / self.side_m).ceil() as i32;
         let mut shell = begin.min(last);
         loop {
@@ -138,7 +138,7 @@ impl Nearest {
         }
     }
 
-    /// What a search that saw everything within `reach`, m, leaves behind.
+    /// Cache entry of a search that saw everything within `reach`, m.
     fn remember(&self, p: &Vector3<f32>, search: &Search, reach: f32) -> NeighbourCache {
         let nearest = search.best.sqrt();
         let found = search.nearest.filter(|_| nearest <= self.max_correspondence_m);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against looking at every point, along a walk whose steps shrink as ICP's do.
+        /// Compares with brute force, along a walk whose steps shrink as ICP's do.
         #[test]
         fn as_looking_at_every_point(
             places in prop::collection::vec(prop::array::uniform3(-0.4f32..0.4), 0..120),

@@ -1,4 +1,4 @@
-//! What stands in for OpenCV's features in a build without them.
+//! Stub for the ORB features in a build without OpenCV.
 
 use nalgebra::Isometry3;
 
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::io::ColourImage;
 use crate::rng::Stream;
 
-/// There are none.
+/// Never constructed.
 pub struct Features;
 
 impl Features {

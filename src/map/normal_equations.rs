@@ -1,4 +1,4 @@
-//! The normal equations of one linearisation, and what they do not determine.
+//! The normal equations of one linearisation, and the motions that they do not determine.
 
 use std::fmt;
 
@@ -6,14 +6,14 @@ use nalgebra::{Matrix3, Matrix6, SVector, SymmetricEigen, Vector3, Vector6};
 
 /// A unit motion that depth does not determine, in the frame of the alignment's target.
 ///
-/// It prints as "shift along x" or "turn about z", with the axis that has most of it.
+/// Displays as "shift along x" or "turn about z", with its dominant axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction {
     /// m.
     pub shift: Vector3<f64>,
-    /// In units of the scene's radius: comparable with the shift.
+    /// In units of the scene's radius, comparable with the shift.
     pub turn: Vector3<f64>,
-    /// Mean square distance that it moves points along their normals, of 1 at most.
+    /// Mean square distance that it moves points along their normals, at most 1.
     pub information: f64,
 }
 
@@ -36,7 +36,7 @@ type Triangle = SVector<f64, 21>;
 pub struct NormalEquations {
     /// J' W J; J = [n, p x n].
     pub h: Triangle,
-    /// The same, every correspondence counting one: what the scene determines, whatever its noise.
+    /// J' J, all correspondences weighted equally: what the geometry determines, regardless of noise.
     pub geometry: Triangle,
     /// J' W r.
     pub g: Vector6<f64>,
@@ -45,9 +45,9 @@ pub struct NormalEquations {
     pub place: Vector3<f64>,
     pub place_squared: f64,
     pub correspondences: usize,
-    /// Unweighted.
+    /// Sum of squared residuals, unweighted.
     pub squares_m2: f64,
-    /// |residual| times weight, of each; empty unless they are asked for.
+    /// |residual| times weight of each correspondence; empty unless requested.
     pub sizes: Vec<f32>,
 }
 
@@ -59,11 +59,10 @@ pub struct Solution {
     pub min_information: f64,
 }
 
-/// A motion is undetermined when it moves the points along their normals by less than this, as a
-/// variance, where a fully determined one moves them by 1: normals are uncertain by a few degrees,
-/// so that a bare wall seems to fix a slide along itself to 0.001 to 0.004.
+/// A motion with less [`Direction::information`] is undetermined; a fully determined one has 1. Normals are
+/// uncertain by a few degrees, so a bare wall seems to determine a slide along itself with 0.001 to 0.004.
 const MIN_INFORMATION: f64 = 0.005;
-/// Gaussian: median of |x| over sigma.
+/// Median of |x| over sigma for a Gaussian.
 const MEDIAN_OVER_SIGMA: f64 = 0.6745;
 
 impl NormalEquations {
@@ -81,17 +80,17 @@ impl NormalEquations {
         self
     }
 
-    /// Sigma of the weighted residuals that are no outliers, from their median.
+    /// Robust sigma of the weighted residuals, from the median of their sizes.
     pub fn robust_sigma(&self) -> f64 {
         let median = f64::from(crate::stats::median_in_place(&mut self.sizes.clone()));
-        // All exactly zero, as in a made-up scene: any scale will do whose square is a number.
+        // All may be exactly zero in a synthetic scene: any scale will do whose square does not underflow.
         (median / MEDIAN_OVER_SIGMA).max(f64::from(f32::MIN_POSITIVE.sqrt()))
     }
 
-    /// The step that makes the cost least; `None` where the sums are no numbers or weigh nothing.
+    /// The step that minimises the cost; `None` where the sums are not finite or have no weight.
     ///
-    /// Solved about the points' centre, turns measured by how far they move the points: then the
-    /// eigenvalues of J' W J compare, and each is at most 1.
+    /// Solved about the centroid, with rotations scaled by the radius: the eigenvalues of J' W J are then
+    /// comparable, and each is at most 1.
     pub fn solve(&self) -> Option<Solution> {
         if !(self.weight > 0.0 && self.weight.is_finite()) {
             return None;
@@ -115,11 +114,11 @@ impl NormalEquations {
         let (mut min_information, mut degenerate_directions) = (f64::INFINITY, Vec::new());
         for (k, &share) in eigen.eigenvalues.iter().enumerate() {
             let along = eigen.eigenvectors.column(k).into_owned();
-            // All correspondences alike: a far corner among near walls weighs little, but it is
-            // there.
+            // Unweighted: a far corner among near walls has little weight, but it determines the
+            // motion.
             let information = along.dot(&(geometry * along));
             min_information = min_information.min(information);
-            // What is not determined stays as it was, and is not known at all.
+            // Undetermined motions keep their start value.
             if information >= MIN_INFORMATION && share > 0.0 {
                 step -= along * (along.dot(&g) / share);
             } else {

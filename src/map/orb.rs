@@ -1,4 +1,4 @@
-//! ORB features of a colour image with their places in space, and the motion between two sets.
+//! ORB features of a colour image with their 3D positions, and the motion between two sets.
 //!
 //! Detector, descriptor and matcher are OpenCV's (Rublee et al., "ORB: an efficient alternative to
 //! SIFT or SURF", ICCV 2011).
@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::io::ColourImage;
 use crate::rng::Stream;
 
-/// The paper's; the rest as OpenCV has it.
+/// The paper's values; the others are OpenCV's defaults.
 const FAST_THRESHOLD: i32 = 50;
 const MAX_FEATURES: i32 = 500;
 
@@ -26,8 +26,8 @@ pub struct Features {
 }
 
 impl Features {
-    /// Of a colour image and the depth, m, of its pixels.
-    /// An error when OpenCV fails.
+    /// Detects features in a colour image, with the depth, m, of its pixels.
+    /// Fails when OpenCV fails.
     pub fn of(image: &ColourImage, depth: &[f32], rays: &Rays) -> Result<Self> {
         Self::detect(image, depth, rays).map_err(failed)
     }
@@ -61,9 +61,9 @@ impl Features {
         Ok(Features { descriptors, places: keypoints.iter().map(place).collect() })
     }
 
-    /// The motion from this frame to `target`: brute force by Hamming distance, each the other's
-    /// nearest, and RANSAC. `None` where too few agree.
-    /// An error when OpenCV fails.
+    /// The motion from this frame to `target`: brute-force matches by Hamming distance with cross-check, and
+    /// RANSAC. `None` where too few agree.
+    /// Fails when OpenCV fails.
     pub fn motion_to(&self, target: &Features, rng: &mut Stream) -> Result<Option<Isometry3<f64>>> {
         let pairs = self.pairs(target).map_err(failed)?;
         Ok(ransac(&pairs, rng))

@@ -1,26 +1,25 @@
-//! A measured piece of surface, its standard deviations as a [`NoiseModel`] says, and a pose that
-//! moves many of them.
+//! Surface points, their standard deviations by a [`NoiseModel`], and a fast rigid motion for many points.
 
 use nalgebra::{Isometry3, Vector3};
 
 use crate::model::{NoiseModel, SigmaLookup};
 
-/// A point of a depth image, or the mean of some, with its surface.
+/// A point of a depth image, or the mean of several, with its surface normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     /// m, optical frame.
     pub at: Vector3<f32>,
     /// Unit length, towards the camera.
     pub normal: Vector3<f32>,
-    /// sigma(z, theta) of one measurement along the optical axis, m.
+    /// sigma(z, theta) of a single measurement along the optical axis, m.
     pub sigma_axial: f32,
-    /// Standard deviation of this point, averaged as it is, along its normal, m.
+    /// Standard deviation of this (averaged) point along its normal, m.
     pub sigma_normal: f32,
-    /// The pixel that stands for it, row-major.
+    /// Index of a representative pixel, row-major.
     pub pixel: u32,
 }
 
-/// A pose for many points: plain single-precision arithmetic, written out so that it is inlined.
+/// A rigid motion for many points, in single precision and written out so that it is inlined.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
     rows: [[f32; 3]; 3],
@@ -38,7 +37,7 @@ impl Motion {
         }
     }
 
-    /// Of a direction.
+    /// Rotates a direction.
     #[inline]
     pub fn turned(&self, v: &Vector3<f32>) -> Vector3<f32> {
         let [a, b, c] = &self.rows;
@@ -46,7 +45,7 @@ impl Motion {
         Vector3::new(dot(a), dot(b), dot(c))
     }
 
-    /// Of a place.
+    /// Moves a position.
     #[inline]
     pub fn moved(&self, p: &Vector3<f32>) -> Vector3<f32> {
         let v = self.turned(p);
@@ -54,22 +53,21 @@ impl Motion {
     }
 }
 
-/// Sigma over depth and tilt, looked up, and how many neighbours err as one.
+/// Look-up table of sigma over depth and tilt, with the correlation of neighbours.
 pub struct Noise {
     table: SigmaLookup,
-    /// The greatest depth that the model was measured at, m.
+    /// The largest depth at which the model was measured, m.
     max_depth_m: f32,
-    /// Pixels that err together: the area of the window that neighbours share, px^2.
+    /// Pixels per independent sample: the area of the window that neighbours share, px^2.
     correlated_px2: f32,
 }
 
-/// The least share of an error of depth that moves a point along its normal: the normal itself, of the
-/// few pixels around, is not known to a degree. Of a surface seen edge on nothing would be left, and
-/// the point would be certain.
+/// Least share of a depth error that moves a point along its normal: the normal, from the few pixels
+/// around, is not known to a degree. Without this floor a point on a surface seen edge-on would be certain.
 const MIN_PART: f32 = 0.02;
 
-/// The effect of the catalogue that says how far neighbours err together, its parameter, and the
-/// share of the variance that does; all where it is not told.
+/// The catalogue effect that gives the correlation length of neighbours, its parameter, and the share of
+/// the variance that is correlated (all of it if not given).
 const CORRELATION: [&str; 3] = ["spatial-correlation", "length_px", "share"];
 
 impl Noise {
@@ -87,13 +85,13 @@ impl Noise {
 
     /// Standard deviation of a depth `z`, m, on a surface with this normal.
     ///
-    /// Beyond the depths of the model sigma grows as z^2, as it does for every sensor that measures
-    /// disparity: held at its edge it would make the farthest points the best.
+    /// Beyond the model's depths sigma grows as z^2, as for every sensor that measures disparity; held at its
+    /// edge value it would make the farthest points the best.
     pub fn sigma_axial(&self, z: f32, normal: &Vector3<f32>) -> f32 {
         self.grown(z, self.table.at(z, normal.z.abs().min(1.0).acos()))
     }
 
-    /// The same of a surface that is faced squarely.
+    /// As [`Noise::sigma_axial`], at normal incidence.
     pub fn sigma_facing(&self, z: f32) -> f32 {
         self.grown(z, self.table.at(z, 0.0))
     }
@@ -104,8 +102,8 @@ impl Noise {
         sigma * beyond * beyond
     }
 
-    /// Sigma, m, of the mean of `n` pixels along their normal: an error of depth moves a point along
-    /// its ray, and of that the normal's part counts.
+    /// Sigma along the normal, m, of the mean of `n` pixels: a depth error moves a point along its ray, and
+    /// only the component along the normal counts.
     pub fn sigma_normal(
         &self,
         sigma_axial: f32,

@@ -1,4 +1,4 @@
-//! A frame from its file to what an alignment needs.
+//! Prepares a frame for alignment, from its file.
 
 use super::blocks::Blocks;
 use super::frame_report::Stages;
@@ -16,7 +16,7 @@ use crate::io::ColourImage;
 use crate::model::NoiseModel;
 use crate::sequence::{Moment, Sequence};
 
-/// The points of a frame, as its method wants them.
+/// The points of a frame, in the form its method needs.
 pub enum Shape {
     Cloud(Nearest),
     Blocks(Blocks, Vec<Point>),
@@ -30,7 +30,7 @@ impl Shape {
         }
     }
 
-    /// As [`Blocks::straightened`]; a cloud of voxels, in which rows are mixed, stays as it is.
+    /// As [`Blocks::straightened`]; a cloud of voxels, which mix image rows, is left unchanged.
     pub fn straighten(&mut self, velocity: &Velocity, camera: &Camera, readout_s: f64) {
         if let Shape::Blocks(blocks, points) = self {
             *blocks = blocks.straightened(velocity, camera, readout_s);
@@ -39,12 +39,12 @@ impl Shape {
     }
 }
 
-/// Without the blocks that have no point.
+/// Points of the blocks that have one.
 fn listed(blocks: &Blocks) -> Vec<Point> {
     blocks.points.iter().flatten().copied().collect()
 }
 
-/// A frame, ready to be aligned and to be aligned to.
+/// A frame ready to be aligned, or to be aligned to.
 pub struct Prepared {
     pub shape: Shape,
     pub features: Option<Features>,
@@ -53,7 +53,7 @@ pub struct Prepared {
     /// As stored.
     pub raw: Frame,
     pub stages: Stages,
-    /// What was odd about its files.
+    /// A problem with its files.
     pub remark: Option<String>,
 }
 
@@ -68,7 +68,7 @@ pub struct Preprocessor<'a> {
 }
 
 impl<'a> Preprocessor<'a> {
-    /// An error when the model is of another sensor.
+    /// Fails when the model is of another sensor.
     pub fn new(sequence: &'a Sequence, model: &NoiseModel, options: &'a Options) -> Result<Self> {
         Ok(Preprocessor {
             sequence,
@@ -81,7 +81,7 @@ impl<'a> Preprocessor<'a> {
         })
     }
 
-    /// An error when the depth image cannot be read, or OpenCV fails.
+    /// Reads and prepares a frame. Fails when the depth image cannot be read, or OpenCV fails.
     pub fn prepare(&self, moment: &Moment) -> Result<Prepared> {
         let mut stages = Stages::default();
         let raw = stages.time("decode", || self.sequence.depth(moment))?;
@@ -104,7 +104,7 @@ impl<'a> Preprocessor<'a> {
         Ok(Prepared { shape, features, colour, colour_stamp, raw, stages, remark })
     }
 
-    /// Depth, m, without the sensor's biases.
+    /// Depth, m, with the sensor's biases corrected.
     fn corrected(&self, raw: &Frame, moment: &Moment) -> Result<Vec<f32>> {
         let mut depth = self.table.depths(raw);
         let session_s = moment.stamp - self.begin;

@@ -5,17 +5,17 @@ use nalgebra::{Isometry3, Vector3};
 use crate::evaluate::align;
 use crate::rng::Stream;
 
-/// Where a point is in the target's frame, and where in the source's, m.
+/// Positions of a point in the target frame and in the source frame, m.
 pub type PointPair = (Vector3<f64>, Vector3<f64>);
 
 /// The paper's inlier threshold and number of hypotheses.
 const MAX_DISTANCE_M: f64 = 0.05;
 const HYPOTHESES: usize = 500;
 
-/// Three points make a motion; as many again that agree make it more than chance.
+/// Three points determine a motion; agreement of as many again is more than chance.
 const MIN_INLIERS: usize = 8;
 
-/// `target_from_source` that brings most pairs together, fitted to those; `None` of too few.
+/// `target_from_source` with the most inliers, fitted to those; `None` with too few.
 pub fn ransac(pairs: &[PointPair], rng: &mut Stream) -> Option<Isometry3<f64>> {
     if pairs.len() < MIN_INLIERS {
         return None;
@@ -30,7 +30,7 @@ pub fn ransac(pairs: &[PointPair], rng: &mut Stream) -> Option<Isometry3<f64>> {
             best = Some((votes, motion));
         }
     }
-    // Once more over all inliers, and over the inliers of that.
+    // Refit to all inliers, then to the inliers of that fit.
     let mut motion = best?.1;
     for _ in 0..2 {
         let inliers: Vec<PointPair> =
@@ -54,8 +54,8 @@ mod tests {
     use crate::rng::Seed;
     use rand::Rng;
 
-    /// Three in ten pairs are right, to a millimetre: 500 draws of three miss all of them with
-    /// probability (1 - 0.3^3)^500 = 1e-6.
+    /// Three in ten pairs are correct to a millimetre: no draw of 500 has three correct ones with a
+    /// probability of (1 - 0.3^3)^500 = 1e-6.
     #[test]
     fn a_minority_that_agrees_is_found() {
         let truth = Isometry3::new(Vector3::new(0.1, -0.2, 0.05), Vector3::new(0.1, 0.2, -0.1));

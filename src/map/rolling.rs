@@ -1,7 +1,7 @@
-//! A rolling shutter made straight: the rows of a depth image are exposed one after the other while
-//! the camera moves. Each point is moved to where the camera would have seen it from its place at
-//! the middle row (after Ringaby and Forssén, "Scan Rectification for Structured Light Range Sensors
-//! with Rolling Shutters", ICCV 2011).
+//! Rolling-shutter correction. The rows of a depth image are exposed one after the other while the camera
+//! moves; each point is moved to where the camera would have seen it at the time of the middle row (after
+//! Ringaby and Forssén, "Scan Rectification for Structured Light Range Sensors with Rolling Shutters", ICCV
+//! 2011).
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -9,7 +9,7 @@ use super::blocks::Blocks;
 use super::point::{Motion, Point};
 use crate::camera::Camera;
 
-/// How a camera moves, in its own frame.
+/// Velocity of a camera, in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Velocity {
     /// m/s.
@@ -19,7 +19,7 @@ pub struct Velocity {
 }
 
 impl Velocity {
-    /// Of a motion that took this long; none where no time passed.
+    /// Mean velocity of a motion that took `seconds`; zero where no time passed.
     pub fn of(motion: &Isometry3<f64>, seconds: f64) -> Self {
         if seconds.is_nan() || seconds <= 0.0 {
             return Velocity::default();
@@ -30,7 +30,7 @@ impl Velocity {
         }
     }
 
-    /// Where the camera is that much later. In the tens of milliseconds of a readout its path is
+    /// Motion of the camera after `seconds`. In the tens of milliseconds of a readout the path is
     /// straight to a hundredth.
     pub fn after(&self, seconds: f64) -> Isometry3<f64> {
         Isometry3::new(self.shift * seconds, self.turn * seconds)
@@ -38,8 +38,8 @@ impl Velocity {
 }
 
 impl Blocks {
-    /// As a camera with this velocity would have seen them at once, at its middle row; `readout_s`
-    /// passes from the first row to the last.
+    /// The blocks as seen all at the time of the middle row, by a camera with this velocity; `readout_s` is
+    /// the time from the first row to the last.
     pub fn straightened(&self, velocity: &Velocity, camera: &Camera, readout_s: f64) -> Blocks {
         let height = camera.height as f64;
         let late = |row: usize| ((row as f64 + 0.5) / height - 0.5) * readout_s;
@@ -59,7 +59,7 @@ impl Blocks {
 mod tests {
     use super::*;
 
-    /// A point that stands still is seen from another place in each row; straightened, all agree.
+    /// A static point is seen from a different place in each row; after the correction all agree.
     #[test]
     fn a_still_point_is_in_one_place_whatever_row_saw_it() {
         let camera = Camera::centred(640, 480, 525.0);
@@ -82,7 +82,7 @@ mod tests {
         };
         assert!(apart(&bent) > 0.02, "{}", apart(&bent));
         let straight = bent.straightened(&velocity, &camera, readout_s);
-        // Single precision at 2 m has steps of 0.24 um; a dozen of them are added.
+        // Single precision at 2 m has steps of 0.24 um, and a dozen values are added.
         assert!(apart(&straight) < 3e-6, "{}", apart(&straight));
         // Nothing moves where no time passed.
         let still = bent.straightened(&Velocity::of(&motion, 0.0), &camera, readout_s);

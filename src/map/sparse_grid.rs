@@ -1,34 +1,34 @@
-//! Cubic cells of space with a number each: a hash table of bricks, 4 x 4 x 4 cells that lie together
-//! in memory, for who asks for one cell asks for its neighbours next.
+//! Maps cubic cells of space to indices: a hash table of bricks of 4 x 4 x 4 cells that lie together in
+//! memory, because look-ups of a cell are followed by look-ups of its neighbours.
 
 use nalgebra::Vector3;
 
 pub type Cell = [i32; 3];
 
-/// From cells to indices 0, 1, 2, ... in order of arrival.
+/// A map from cells to indices 0, 1, 2, ... in order of insertion.
 #[derive(Debug, Clone)]
 pub struct SparseGrid {
-    /// The first brick of each slot, [`NONE`] where there is none; a power of two of them.
+    /// The first brick of each slot or [`NONE`]; their number is a power of two.
     slots: Vec<u32>,
     bricks: Vec<Brick>,
-    /// The brick that was written to last: the next cell is mostly in it, too.
+    /// The brick last written to; the next cell is mostly in it, too.
     recent: u32,
     cells: Vec<Cell>,
 }
 
 #[derive(Debug, Clone)]
 struct Brick {
-    /// A quarter of its cells' coordinates.
+    /// The cells' coordinates divided by four.
     at: Cell,
     /// The next brick of the same slot.
     next: u32,
-    /// A bit a cell, x fastest.
+    /// One bit per cell, x fastest.
     occupied: u64,
     index: [u32; 64],
 }
 
 const NONE: u32 = u32::MAX;
-/// A room of 4 m has 32^3 bricks of 3 cm cells, of which surfaces fill a tenth.
+/// Initial slots. A room of 4 m has 32^3 bricks of 3 cm cells, of which surfaces fill a tenth.
 const SLOTS: usize = 1 << 12;
 
 impl Default for SparseGrid {
@@ -53,7 +53,7 @@ impl SparseGrid {
         (brick.occupied >> bit & 1 == 1).then(|| brick.index[bit] as usize)
     }
 
-    /// The index of a cell, a new one if it had none.
+    /// The index of a cell, newly assigned if it had none.
     #[inline]
     pub fn insert(&mut self, cell: Cell) -> usize {
         let brick = self.brick_to_write(cell.map(|v| v >> 2));
@@ -66,13 +66,13 @@ impl SparseGrid {
         brick.index[bit] as usize
     }
 
-    /// Visit the indices of all cells in a box, both corners included.
+    /// Visits the indices of all cells in a box, both corners included.
     #[inline]
     pub fn for_each_within(&self, low: Cell, high: Cell, mut visit: impl FnMut(usize)) {
         self.for_each_cell_within(low, high, |index, _| visit(index));
     }
 
-    /// The same, with the cells.
+    /// As [`SparseGrid::for_each_within`], with the cells.
     #[inline]
     pub fn for_each_cell_within(&self, low: Cell, high: Cell, mut visit: impl FnMut(usize, Cell)) {
         let [x, y, z] = [0, 1, 2].map(|k| low[k] >> 2..=high[k] >> 2);
@@ -135,7 +135,7 @@ impl SparseGrid {
         self.bricks[i as usize].next = std::mem::replace(&mut self.slots[slot], i);
     }
 
-    /// Bricks side by side are in slots side by side, and no two of a box of 5 x 5 x 5 share one.
+    /// Adjacent bricks are in adjacent slots, and no two of a box of 5 x 5 x 5 share one.
     #[inline]
     fn slot(&self, [x, y, z]: Cell) -> usize {
         let place = x.wrapping_add(y.wrapping_mul(19)).wrapping_add(z.wrapping_mul(367));
@@ -143,16 +143,16 @@ impl SparseGrid {
     }
 }
 
-/// A cell's bit in its brick.
+/// Bit number of a cell in its brick.
 #[inline]
 fn bit([x, y, z]: Cell) -> usize {
     ((x & 3) | (y & 3) << 2 | (z & 3) << 4) as usize
 }
 
-/// The bits of a brick's cells that are in a box which it touches.
+/// Bit mask of a brick's cells that lie in a box which it overlaps.
 #[inline]
 fn inside(brick: Cell, low: Cell, high: Cell) -> u64 {
-    // Along each axis: from 0 to 3 inside the brick.
+    // Range along each axis, 0 to 3 inside the brick.
     let bits = |k: usize, wide: u32| -> u64 {
         let first = (low[k] - 4 * brick[k]).max(0) as u32;
         let last = (high[k] - 4 * brick[k]).min(3) as u32;
@@ -164,18 +164,18 @@ fn inside(brick: Cell, low: Cell, high: Cell) -> u64 {
     x & y & bits(2, 16)
 }
 
-/// The cell of side 1 / `per_metre` that holds a point.
+/// The cell of side 1 / `per_metre` that contains a point.
 #[inline]
 pub fn cell_of(at: &Vector3<f32>, per_metre: f32) -> Cell {
     [at.x, at.y, at.z].map(|v| cell_along(v, per_metre))
 }
 
-/// One of its coordinates.
+/// One coordinate of [`cell_of`].
 #[inline]
 pub fn cell_along(v: f32, per_metre: f32) -> i32 {
-    // floor() is a call into the C library on plain x86-64, and a checked cast is four
-    // instructions a number. The sum with 1.5 * 2^23 has a step of 1: its last bits are the whole
-    // number, up to 2^22; a cell beyond, or NaN, is some cell.
+    // floor() is a call into the C library on plain x86-64, and a checked cast takes four
+    // instructions. Near 1.5 * 2^23 an `f32` has a step of 1, so the low bits of the sum are the
+    // integer, up to 2^22. Coordinates beyond, and NaN, give an arbitrary cell.
     const WHOLE: f32 = 12_582_912.0;
     ((v * per_metre - 0.5 + WHOLE).to_bits() as i32).wrapping_sub(WHOLE.to_bits() as i32)
 }

@@ -1,6 +1,6 @@
-//! The map as small pieces of surface: seen again, a surfel gets surer; seen from elsewhere, it is
-//! what the next frame aligns to (after Keller et al., "Real-time 3D reconstruction in dynamic
-//! scenes using point-based fusion", 3DV 2013).
+//! The map as small pieces of surface (surfels). Each observation makes a surfel more certain, and new
+//! frames are aligned to the surfels (after Keller et al., "Real-time 3D reconstruction in dynamic scenes
+//! using point-based fusion", 3DV 2013).
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -11,7 +11,7 @@ use super::map_points::{MapPoint, colour_of, mean_colour};
 use super::point::{Motion, Point};
 use crate::camera::Camera;
 
-/// A piece of the map; its point's `sigma_normal` is the standard deviation of where it stands.
+/// A piece of the map; its point's `sigma_normal` is the standard deviation of its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surfel {
     /// In the map's frame.
@@ -19,30 +19,30 @@ pub struct Surfel {
     seen: u32,
     /// Number of the frame that saw it last.
     last: u32,
-    /// Red, green and blue, 0 to 255; a mean over the times it was seen in colour.
+    /// Red, green and blue, 0 to 255; mean over the observations with colour.
     colour: Vector3<f32>,
     coloured: u32,
 }
 
 pub struct Surfels {
     surfels: Vec<Surfel>,
-    /// A surfel never counts for more than this many of its observations: the pose it was put down
-    /// with errs too, and that error is not averaged away.
+    /// A surfel never counts for more than this many of its observations: the poses err too, and that error
+    /// does not average out.
     max_observations: f32,
 }
 
-/// A surfel and an observation may be this much farther apart than [`SIGMAS`], m: the pose errs.
+/// Distance allowed between a surfel and an observation beyond [`SIGMAS`], m, for the error of the pose.
 const POSE_M: f32 = 0.01;
-/// Cosine between their normals: 37 degrees.
+/// Least cosine between their normals: 37 degrees.
 const MIN_COSINE: f32 = 0.8;
-/// Along the surface they are one when they are this many block widths apart or less.
+/// Largest distance between them along the surface, block widths.
 const MAX_WIDTHS_APART: f32 = 1.0;
-/// A surfel seen less often than this ...
+/// Observations that confirm a surfel.
 const CONFIRMED: u32 = 3;
-/// ... by the time this many frames have passed was a mistake.
+/// Frames after the last observation within which an unconfirmed surfel is kept.
 const PROBATION: u32 = 30;
 
-/// Averages of fewer are as rough as the frames themselves.
+/// Averages of fewer are as noisy as the frames themselves.
 const MIN_OBSERVATIONS: f32 = 3.0;
 
 impl Surfels {
@@ -54,7 +54,7 @@ impl Surfels {
         self.surfels.is_empty()
     }
 
-    /// What a camera with blocks of `side_px` would see.
+    /// Renders what a camera with blocks of `side_px` would see.
     pub fn seen_from<'a>(
         &self,
         map_from_camera: &Isometry3<f64>,
@@ -65,8 +65,8 @@ impl Surfels {
         IndexMap::render(points, map_from_camera, camera, side_px)
     }
 
-    /// How many observations count is the noise model's to say as far as it holds: where residuals are
-    /// larger than it expects, poses err, too, and what is old is of less use.
+    /// Sets how many observations count at most. Where residuals are larger than the noise model expects, the
+    /// poses err more and old observations are worth less, so fewer count.
     pub fn remember(&mut self, max_observations: f32, misfit: f64) {
         let held =
             if misfit.is_finite() { (SOUND_MISFIT / misfit).powi(2).min(1.0) as f32 } else { 1.0 };
@@ -74,7 +74,7 @@ impl Surfels {
             (held * max_observations).max(MIN_OBSERVATIONS.min(max_observations));
     }
 
-    /// Take in what frame `number` saw, with its colours. `index_map` is that of about this pose.
+    /// Fuses the points of frame `number`, with its colours. `index_map` is rendered from about this pose.
     pub fn fuse(
         &mut self,
         index_map: &IndexMap<'_>,
@@ -86,7 +86,7 @@ impl Surfels {
         let motion = Motion::of(map_from_camera);
         for point in blocks.points.iter().flatten() {
             let facing = -point.normal.dot(&point.at) / point.at.norm();
-            // On a slanted surface a block is longer.
+            // A block is longer on a slanted surface.
             let focal_px = index_map.camera.fx as f32;
             let width_m = blocks.side_px as f32 * point.at.z / focal_px / facing;
             let moved = Point {
@@ -111,7 +111,7 @@ impl Surfels {
         }
     }
 
-    /// The surfel that a point of the map's frame, `width_m` wide, belongs to.
+    /// Finds the surfel that a point in the map frame, `width_m` wide, belongs to.
     fn associate(&self, index_map: &IndexMap<'_>, p: &Point, width_m: f32) -> Association {
         let Some(block) = index_map.block(&p.at) else { return Association::New };
         let mut best: Option<(f32, usize)> = None;
@@ -129,7 +129,7 @@ impl Surfels {
         if let Some((_, i)) = best {
             return Association::Known(i);
         }
-        // Where the map has a sure surface a little before or behind, a point is a mistake.
+        // A point slightly in front of or behind a confirmed surface is a mistake.
         let doubtful = index_map.front(block).is_some_and(|i| {
             let (_, normal, limit) = apart(p, &self.surfels[i].point);
             normal < 2.0 * limit && self.surfels[i].seen > CONFIRMED
@@ -137,7 +137,7 @@ impl Surfels {
         if doubtful { Association::Conflict } else { Association::New }
     }
 
-    /// Take out what was seen once or twice and never again.
+    /// Removes surfels that were seen once or twice and never again.
     pub fn prune(&mut self, now: u32) {
         self.surfels.retain(|s| s.seen >= CONFIRMED || now.saturating_sub(s.last) < PROBATION);
     }
@@ -153,16 +153,16 @@ impl Surfels {
     }
 }
 
-/// What an observation is to the map.
+/// How an observation relates to the map.
 enum Association {
     Known(usize),
     New,
-    /// Neither a known surface nor free of doubt: leave it.
+    /// Doubtful and on no known surface: it is dropped.
     Conflict,
 }
 
-/// How far a point is from a surfel along its surface and along its normal, and how far along the
-/// normal it may be if they are one, m.
+/// Distance of a point from a surfel along its surface and along its normal, and the limit along the
+/// normal if they are one surface, m.
 fn apart(p: &Point, surfel: &Point) -> (f32, f32, f32) {
     let off = p.at - surfel.at;
     let normal = off.dot(&surfel.normal);
@@ -172,7 +172,7 @@ fn apart(p: &Point, surfel: &Point) -> (f32, f32, f32) {
 }
 
 impl Surfel {
-    /// Average in an observation; `max` of them count at most.
+    /// Averages in an observation; at most `max` of them count.
     fn observe(&mut self, p: &Point, colour: Option<Vector3<f32>>, number: u32, max: f32) {
         let (mine, new) = (self.point.sigma_normal.powi(-2), p.sigma_normal.powi(-2));
         let share = new / (mine + new);
@@ -192,11 +192,11 @@ impl Surfel {
     }
 }
 
-/// The surfels that an index map shows, to align to.
+/// The surfels that an index map shows, as alignment target.
 pub struct SurfelTarget<'a> {
     pub surfels: &'a Surfels,
     pub index_map: &'a IndexMap<'a>,
-    /// Neighbours farther than this do not count, m.
+    /// Largest distance of a neighbour, m.
     pub max_correspondence_m: f32,
 }
 

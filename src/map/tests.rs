@@ -1,4 +1,4 @@
-//! Truth: corners whose motion is known, and noise whose size is known.
+//! Tests against ground truth: corners with a known motion, and noise of a known size.
 
 use nalgebra::{Isometry3, Vector3};
 use rand_distr::{Distribution, Normal};
@@ -18,11 +18,11 @@ fn camera() -> Camera {
     Camera::centred(320, 240, 262.5)
 }
 
-/// Planes n . p = d of a room's corner, and a near wall: every motion is determined.
+/// Planes n . p = d of the corner of a room: every motion is determined.
 const CORNER: [([f64; 3], f64); 3] =
     [([0.6, 0.0, 0.8], 2.4), ([-0.8, 0.0, 0.6], 1.6), ([0.0, 0.8, 0.6], 1.5)];
 
-/// What a camera at `pose` sees of planes: the nearest that it faces.
+/// Depth image of planes from a camera at `pose`: the nearest in front of it.
 fn picture(planes: &[([f64; 3], f64)], pose: &Isometry3<f64>) -> Vec<f32> {
     let rays = camera().rays();
     let depth = |i: usize| {
@@ -90,7 +90,7 @@ fn a_known_motion_before_a_corner_is_found() {
     }
 }
 
-/// A bare wall: two shifts along it and the turn about its normal stay where they were.
+/// A bare wall: two shifts along it and the turn about its normal keep their start values.
 #[test]
 fn what_a_wall_does_not_determine_is_named_and_kept() {
     let wall = [([0.0, 0.0, 1.0], 2.0)];
@@ -119,8 +119,8 @@ fn noisy(depth: &[f32], rng: &mut Stream) -> Vec<f32> {
     depth.iter().map(draw).collect()
 }
 
-/// A near corner on the left, a far one on the right, and noise that grows as z^2. Were the weights
-/// worth nothing, they would win 17 or more of 20 draws with probability 0.0013.
+/// A near corner on the left, a far one on the right, and noise that grows as z^2. If the weights had no
+/// effect, they would win 17 or more of 20 draws with a probability of 0.0013.
 #[test]
 fn weights_beat_none_where_noise_differs() {
     let two_corners = |pose: &Isometry3<f64>| -> Vec<f32> {
@@ -145,7 +145,7 @@ fn weights_beat_none_where_noise_differs() {
     assert!(won >= 17 && squares[1] < 0.5 * squares[0], "{won} of 20; {squares:?}");
 }
 
-/// A target whose pairs are held closer together near the goal.
+/// A target with the `Gate` switched on.
 struct Gated<'a>(Projective<'a>);
 
 impl Target for Gated<'_> {
@@ -158,9 +158,8 @@ impl Target for Gated<'_> {
     }
 }
 
-/// Where the noise is four times the model's and a fifth of the target has moved by 7 cm, within the
-/// widest gate of 10 cm, the nearer gate keeps those pairs out. Where all is as the model says, nothing
-/// changes.
+/// With noise of four times the model's and a fifth of the target moved by 7 cm, within the widest gate
+/// of 10 cm, the narrower gate keeps those pairs out. Where the noise is as modelled, nothing changes.
 #[test]
 fn pairs_are_held_together_where_the_noise_model_falls_short() {
     let (still, moved) = (picture(&CORNER, &Isometry3::identity()), picture(&CORNER, &motion()));
@@ -198,8 +197,8 @@ fn pairs_are_held_together_where_the_noise_model_falls_short() {
     assert!(sums[1] < 0.5 * sums[0], "{sums:?}");
 }
 
-/// The reported covariance is the scatter of the estimates, to a factor: 40 draws give a standard
-/// deviation to 11 %, and normals that err too cost some more.
+/// The reported covariance matches the scatter of the estimates, to a factor: 40 draws give a standard
+/// deviation to 11 %, and errors of the normals add some.
 #[test]
 fn the_covariance_is_the_scatter() {
     let (still, moved) = (picture(&CORNER, &Isometry3::identity()), picture(&CORNER, &motion()));
@@ -209,7 +208,7 @@ fn the_covariance_is_the_scatter() {
         let a = noisy(&still, &mut Seed(seed).stream("still"));
         let b = noisy(&moved, &mut Seed(seed).stream("moved"));
         let found = projected(&b, &a, &options);
-        // The covariance is of the target's frame: an error there.
+        // The covariance is in the target frame, so the error is taken there.
         let off = found.target_from_source * motion().inverse();
         squares += off.translation.vector.map(|v| v * v);
         reported += found.covariance.diagonal().fixed_rows::<3>(0).into_owned();
@@ -220,7 +219,7 @@ fn the_covariance_is_the_scatter() {
     }
 }
 
-/// Points without a number, pictures of nothing: no panic, no pose.
+/// Images without any valid depth give neither a panic nor a pose.
 #[test]
 fn nothing_in_nothing_out() {
     let nan = vec![f32::NAN; camera().pixels()];

@@ -1,4 +1,4 @@
-//! Frame after frame: start, align, judge, keep.
+//! Tracks the camera frame by frame: start, align, judge, fuse.
 
 use nalgebra::Isometry3;
 
@@ -14,12 +14,12 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::trajectory::Pose;
 
-/// Fewer points are no picture of anything.
+/// Fewest points in a usable frame.
 const MIN_POINTS: usize = 200;
-/// From frame to frame the share of points with a neighbour falls to .94 of what it was at worst on
-/// fr1_rpy and 7-Scenes; a metre away in the same room floor and walls still match, at .36 to .48.
+/// Least share of points with a neighbour, relative to the frame before. It falls to 0.94 at worst on fr1_rpy
+/// and 7-Scenes; from a metre away in the same room floor and walls still match, at 0.36 to 0.48.
 const MIN_RATIO_KEPT: f64 = 0.6;
-/// Surfels are sorted out every so many frames.
+/// Surfels are pruned every this many frames.
 const PRUNE_EVERY: u32 = 10;
 
 pub struct Tracker<'a> {
@@ -31,9 +31,9 @@ pub struct Tracker<'a> {
     stamp: f64,
     pose: Isometry3<f64>,
     motion: Isometry3<f64>,
-    /// Its pose by the colour images' features alone.
+    /// Its pose from the features of the colour images alone.
     pose_by_colour: Isometry3<f64>,
-    /// Share of its points that had a neighbour.
+    /// Share of its points with a neighbour.
     inlier_ratio: f64,
     surfels: Surfels,
     grid: PointGrid,
@@ -57,8 +57,8 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// Take in a frame; one that could not be read is lost.
-    /// An error when OpenCV fails.
+    /// Tracks a frame; one that could not be read is lost.
+    /// Fails when OpenCV fails.
     pub fn track(&mut self, stamp: f64, frame: Result<Prepared>) -> Result<FrameReport> {
         let mut frame = match frame {
             Ok(frame) => frame,
@@ -100,7 +100,7 @@ impl<'a> Tracker<'a> {
         });
         let mut alignment = self.align(last, &frame, start, stages);
         if self.options.readout_s > 0.0 {
-            // Now that the motion is known the rows can be put in their places.
+            // The motion is now known, so the rolling shutter can be corrected.
             let moved = alignment.target_from_source;
             let velocity = Velocity::of(&moved, report.stamp - self.stamp);
             frame.shape.straighten(&velocity, self.camera, self.options.readout_s);
@@ -124,8 +124,7 @@ impl<'a> Tracker<'a> {
         Ok(())
     }
 
-    /// Where this frame is in the last one's, by features of their colour images; there are some only
-    /// where they are asked for.
+    /// Pose of this frame in the last one, from features of their colour images, if requested.
     fn seen_motion(&self, last: &Prepared, frame: &Prepared) -> Result<Option<Isometry3<f64>>> {
         let (Some(here), Some(there)) = (&frame.features, &last.features) else {
             return Ok(None);
@@ -134,7 +133,7 @@ impl<'a> Tracker<'a> {
         here.motion_to(there, &mut rng)
     }
 
-    /// In the frame of the last camera.
+    /// Aligns a frame; the result is in the frame of the last camera.
     fn align(
         &self,
         last: &Prepared,
@@ -164,7 +163,7 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// Why an alignment is not to be believed.
+    /// Why an alignment must be rejected, if it must.
     fn doubt(&self, alignment: &Alignment) -> Option<String> {
         let pose = &alignment.target_from_source;
         let mut numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
@@ -186,7 +185,7 @@ impl<'a> Tracker<'a> {
         })
     }
 
-    /// Make a frame part of the map and the one to go on from.
+    /// Fuses a frame into the map and makes it the last frame.
     fn keep(&mut self, frame: Prepared, pose: Isometry3<f64>, stages: &mut Stages) {
         if self.last.is_some() {
             self.motion = renormalised(&(self.pose.inverse() * pose));

@@ -1,5 +1,5 @@
 //! Depth image -> voxel grid -> points with normals: the paper's front end. A voxel keeps the moments
-//! of its points; a normal is the direction in which a voxel and its neighbours vary least.
+//! of its points; its normal is the direction of least variance in its neighbourhood.
 
 use nalgebra::Vector3;
 
@@ -14,7 +14,7 @@ pub struct Voxel {
     pub sum: Vector3<f32>,
     /// xx, xy, xz, yy, yz, zz.
     pub squares: [f32; 6],
-    /// The first pixel that fell in.
+    /// The first of these pixels.
     pub pixel: u32,
 }
 
@@ -22,19 +22,19 @@ pub struct Voxel {
 pub struct Voxels {
     pub side_m: f32,
     pub grid: SparseGrid,
-    /// By the index of its cell.
+    /// Indexed by the index of their cells.
     pub voxels: Vec<Voxel>,
 }
 
-/// A Kinect's picture of a room fills about this many cells of 3 cm.
+/// Capacity: a Kinect's image of a room fills about this many cells of 3 cm.
 const USUAL_CELLS: usize = 20_000;
 
 impl Voxels {
-    /// Of a depth image, m, NaN where nothing was measured.
+    /// Bins a depth image, m, NaN where nothing was measured.
     pub fn of(depth: &[f32], rays: &Rays, side_m: f32) -> Self {
         let mut grid = SparseGrid::with_room(USUAL_CELLS);
         let mut voxels: Vec<Voxel> = Vec::with_capacity(USUAL_CELLS);
-        // Neighbouring pixels mostly fall in one cell: it is looked up when they leave it.
+        // Neighbouring pixels mostly fall in one cell, which is looked up only when a run leaves it.
         let (mut here, mut run) = ([i32::MAX; 3], Run::default());
         let mut leave = |cell: Cell, run: &Run| {
             if run.voxel.n > 0.0 {
@@ -87,10 +87,10 @@ impl Voxels {
     }
 }
 
-/// Pixels worked on at once: what a core keeps at hand.
+/// Pixels processed at once, few enough for a core's fast cache.
 const STRIP: usize = 128;
 
-/// Pixels in a row that fall in one cell.
+/// Consecutive pixels that fall in one cell.
 #[derive(Debug, Clone, Copy, Default)]
 struct Run {
     voxel: Voxel,
@@ -122,7 +122,7 @@ impl Voxel {
         }
     }
 
-    /// Add another's moments about the same corner.
+    /// Adds another voxel's moments about the same corner.
     #[inline]
     fn plus(&mut self, other: &Voxel) {
         self.n += other.n;
@@ -132,7 +132,7 @@ impl Voxel {
         }
     }
 
-    /// Add another's moments, whose corner lies at `o` from this one's, m.
+    /// Adds another voxel's moments, whose corner is at the offset `o` from this one's, m.
     #[inline]
     fn merge(&mut self, other: &Voxel, o: Vector3<f32>) {
         let (s, n) = (other.sum, other.n);
@@ -148,13 +148,13 @@ impl Voxel {
     }
 }
 
-/// Fewer pixels make no surface.
+/// Fewest pixels that define a surface.
 const MIN_PIXELS: f32 = 6.0;
-/// The middle principal variance over the greatest: less is a line, which has no normal.
+/// Least ratio of the middle principal variance to the largest: less is a line, which has no normal.
 const MIN_WIDTH_RATIO: f64 = 0.01;
 
-/// The points of a voxel grid with the normals of their neighbourhoods, which are all pixels in the
-/// 3 x 3 x 3 cells around each. Voxels without a surface are left out.
+/// Points of a voxel grid, each with the normal of all pixels in the 3 x 3 x 3 cells around it. Voxels
+/// without a surface are left out.
 pub fn points_of(voxels: &Voxels, noise: &Noise) -> Vec<Point> {
     let point = |index: usize| {
         let around = neighbourhood(voxels, index);
@@ -180,7 +180,7 @@ fn neighbourhood(voxels: &Voxels, index: usize) -> Voxel {
     around
 }
 
-/// Unit vector along which the points vary least; `None` where they are few or on a line.
+/// Unit vector of least variance; `None` where the points are few, on a line or a ball.
 fn normal_of(v: &Voxel) -> Option<Vector3<f32>> {
     if v.n < MIN_PIXELS {
         return None;
@@ -197,12 +197,12 @@ fn normal_of(v: &Voxel) -> Option<Vector3<f32>> {
         q[5] - m.z * m.z,
     ];
     let ([min, middle, max], direction) = min_variance_direction(covariance)?;
-    // A sphere of noise has no normal either: twice as thick as a plane may be.
+    // A ball of noise has no normal either: the least variance must be below half the middle one.
     (middle > MIN_WIDTH_RATIO * max && min < 0.5 * middle).then(|| direction.cast())
 }
 
 /// Eigenvalues, ascending, and the unit eigenvector of the smallest, of the symmetric matrix with
-/// these xx, xy, xz, yy, yz, zz: in closed form, by the cosine of a third of an angle (Smith 1961).
+/// entries xx, xy, xz, yy, yz, zz: in closed form by trigonometry (Smith 1961).
 fn min_variance_direction(m: [f64; 6]) -> Option<([f64; 3], Vector3<f64>)> {
     let [xx, xy, xz, yy, yz, zz] = m;
     let mean = (xx + yy + zz) / 3.0;
@@ -220,7 +220,7 @@ fn min_variance_direction(m: [f64; 6]) -> Option<([f64; 3], Vector3<f64>)> {
     let max = mean + 2.0 * p * cos;
     let min = mean - p * (cos + 3f64.sqrt() * sin);
     let middle = 3.0 * mean - max - min;
-    // Rows of M - min I are normal to the eigenvector: the longest of their products is along it.
+    // Rows of M - min I are normal to the eigenvector; the longest of their cross products is along it.
     let rows = [
         Vector3::new(xx - min, xy, xz),
         Vector3::new(xy, yy - min, yz),

@@ -1,24 +1,24 @@
-//! A table of more rows than a fit can take, its neighbours pooled.
+//! Pools neighbouring rows of a table that is too long for a fit.
 
 use std::collections::BTreeMap;
 
 use super::table::{SigmaRow, SigmaTable};
 use crate::units::counted;
 
-/// A fit of so many takes ten seconds, and of four times as many a hundred.
+/// A fit of this many rows takes ten seconds, and of four times as many a hundred.
 pub const MAX_ROWS: usize = 10_000;
 
 impl SigmaTable {
-    /// The table itself, or where it has more than `MAX_ROWS` rows one of at most so many, and a
-    /// sentence on it: rows of one view, alike in distance and tilt, are pooled into one of their mean
-    /// variance. Where there are more views than that, views are pooled too.
+    /// The table itself, or where it has more than `MAX_ROWS` rows one of at most that many, and a remark.
+    /// Rows of one view that are similar in distance and tilt are pooled into one of their mean variance.
+    /// With more views than `MAX_ROWS`, views are pooled too.
     pub fn binned(&self) -> (SigmaTable, Option<String>) {
         let n = self.rows.len();
         if n <= MAX_ROWS {
             return (self.clone(), None);
         }
-        // 100 x 100 cells; fewer where there are many views. A row that is a view by itself shares
-        // nothing with others, and is pooled as if it had none.
+        // 100 x 100 cells, fewer where there are many views. Where most views are single rows, which
+        // share no errors with others, rows are pooled regardless of the view.
         let views = 1 + self.rows.iter().map(|r| r.view).max().unwrap_or(0);
         let by_view = 2 * views < n && views <= MAX_ROWS;
         let mut side = 100;
@@ -38,7 +38,7 @@ impl SigmaTable {
         (SigmaTable { rows }, Some(remark))
     }
 
-    /// Rows by view, and by steps of the logarithm of the distance and of the tilt.
+    /// Groups rows by view, and by steps in the logarithm of the distance and in the tilt.
     fn cells(&self, side: usize, by_view: bool) -> BTreeMap<[usize; 3], Vec<&SigmaRow>> {
         let ends = |of: fn(&SigmaRow) -> f64| crate::stats::range(self.rows.iter().map(of));
         let (z, theta) = (ends(|r| r.z_m.ln()), ends(|r| r.theta_rad));
@@ -56,7 +56,7 @@ impl SigmaTable {
     }
 }
 
-/// Weighted by their samples.
+/// Mean of rows, weighted by their samples.
 fn pool(rows: &[&SigmaRow], view: usize) -> SigmaRow {
     let weight = |r: &SigmaRow| r.n_effective.unwrap_or(1.0);
     let all: f64 = rows.iter().map(|r| weight(r)).sum();

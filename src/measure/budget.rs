@@ -1,21 +1,20 @@
-//! What a view's distance is worth beside the reference: the uncertainty budget of its error.
+//! Uncertainty budget of a view's distance error against its reference.
 
 use super::ViewMeasurement;
 use crate::stats::{Budget, Component, Distribution, rounding_uncertainty};
 use crate::view::{Sensor, ViewNotes};
 
-/// Three parameters of the plane.
 const PLANE_PARAMETERS: f64 = 3.0;
 
-/// Flatness is the distance of the two planes that hold the surface (ISO 1101): any one place lies
-/// within half of it of their middle, and nothing is known of where (GUM F.2.3.3).
+/// Standard uncertainty by flatness, the distance of the two planes that enclose the surface (ISO 1101): a
+/// point lies anywhere within half of it from their middle (GUM F.2.3.3).
 pub fn flatness_uncertainty_m(flatness_m: f64) -> f64 {
     flatness_m / 12f64.sqrt()
 }
 
-/// Of the error of indication: depth of the fitted plane on the optical axis minus the reference.
-/// Nothing where the recording does not say how well the reference is known: its part is mostly the
-/// largest, and a budget without it would promise too much.
+/// Budget of the error of indication: depth of the fitted plane on the optical axis minus the reference.
+/// `None` where the recording does not state the uncertainty of the reference, which is mostly the largest
+/// component: a budget without it would promise too much.
 pub fn distance_budget(m: &ViewMeasurement, notes: &ViewNotes, sensor: &Sensor) -> Option<Budget> {
     let reference_u_m = notes.reference_uncertainty_m?;
     let error_m = m.reference()?.off_m();
@@ -30,15 +29,15 @@ pub fn distance_budget(m: &ViewMeasurement, notes: &ViewNotes, sensor: &Sensor) 
         components.push(Component::type_b("flatness of the target", Distribution::Rectangular, u));
     }
     let step_m = sensor.code.step_inverse(z) * z * z;
-    // What was measured holds the rounding's own variance.
+    // The measured variance includes that of the rounding.
     let noise = (m.whole.spread.spatial_m.powi(2) - step_m * step_m / 12.0).max(0.0).sqrt();
     let rounding = rounding_uncertainty(step_m, noise);
     let dithered = Distribution::DitheredRectangular;
     components.push(Component::type_b("resolution of the stored depth", dithered, rounding));
     let stated = sensor.intrinsics_uncertainty.as_ref();
     if let Some([across, down]) = stated.and_then(|i| i.axis_rad(&sensor.camera)) {
-        // The axis meets a tilted plane at another depth: dz = z tan(theta) along the slope. Where the
-        // depth is read does not depend on the focal length.
+        // The axis meets a tilted plane at another depth: dz = z tan(theta) along the slope. The focal
+        // length does not affect where the depth is read.
         let (sin, cos) = m.azimuth_rad.sin_cos();
         let u = (cos * across).hypot(sin * down);
         let sensitivity = z * m.theta_rad.tan();

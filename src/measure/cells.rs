@@ -1,9 +1,9 @@
-//! Bins of depth inside a view, and the arithmetic of their spread.
+//! Bins of depth inside a view, and their standard deviations.
 
-/// Several views of one standard deviation, m.
+/// Standard deviations of the residual, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
-    /// Of one frame over the pixels, axial, about the plane: the paper's notion, along the axis.
+    /// Over the pixels of one frame, axial, about the plane: as in the paper, but along the axis.
     pub spatial_m: f64,
     /// Of one pixel over the frames; `None` with a single frame.
     pub temporal_m: Option<f64>,
@@ -14,7 +14,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Share of the spatial variance that stays from frame to frame, 0 to 1; `None` with a single frame.
+    /// Share of the spatial variance that is constant over the frames, 0 to 1; `None` with a single frame.
     pub fn fixed_share(&self) -> Option<f64> {
         let temporal = self.temporal_m?;
         Some((1.0 - (temporal / self.spatial_m).powi(2)).clamp(0.0, 1.0))
@@ -33,9 +33,9 @@ pub struct Cell {
     pub mean_std_error_m: f64,
     /// Samples (pixels times frames) used.
     pub n: usize,
-    /// Independent samples they are worth for a variance.
+    /// Effective number of independent samples for a variance.
     pub n_effective: f64,
-    /// Independent samples the temporal sigma is worth: a pixel gives one frame less than it has.
+    /// Effective number of independent samples for the temporal sigma: one frame per pixel is lost.
     pub n_effective_temporal: f64,
     /// Samples of target pixels without a depth.
     pub dropouts: usize,
@@ -51,7 +51,7 @@ impl Cell {
     }
 }
 
-/// A view is binned when its depth runs over more than this ratio ...
+/// A view is binned when its depths span more than this ratio ...
 const BIN_WHEN_RATIO: f64 = 1.10;
 /// ... into bins of at most this ratio: sigma ~ z^2 then varies by 10 % inside a bin, and the
 /// root mean square differs from sigma at the mean depth by less than 0.1 %.
@@ -89,11 +89,11 @@ impl Bins {
 pub(super) struct Sums {
     pub n: f64,
     pub z: f64,
-    /// Of the axial residual, its square, and the square of the perpendicular one.
+    /// Sums of the axial residual, its square, and the square of the perpendicular residual.
     pub e: f64,
     pub e2: f64,
     pub p2: f64,
-    /// Within pixels over frames: squared deviations and their degrees of freedom.
+    /// Within pixels over the frames: squared deviations and their degrees of freedom.
     pub within: f64,
     pub within_dof: f64,
     /// Between frames: n_f (mean_f - mean)^2.
@@ -102,7 +102,7 @@ pub(super) struct Sums {
     pub cut: usize,
     /// Pixels that gave at least one sample.
     pub pixels: f64,
-    /// Bins in it: each has frames' means of its own in `between`.
+    /// Number of merged bins: each has its own frame means in `between`.
     pub bins: f64,
 }
 
@@ -123,24 +123,24 @@ impl Sums {
     }
 }
 
-/// What is known about a view when its cells are evaluated.
+/// Properties of a view needed to evaluate its cells.
 pub(super) struct Context {
     pub frames: f64,
-    /// Variance left by the cut of the tails, as a share.
+    /// Share of the variance left by the cut of the tails.
     pub cut_factor: f64,
     /// Pixels per independent sample of a mean and of a variance.
     pub correlation_sum: f64,
     pub correlation_squares: f64,
-    /// Correlation of the moving part one frame apart; a first-order filter from there.
+    /// Correlation of the moving part one frame apart, taken as a first-order filter.
     pub temporal_rho: f64,
-    /// Pixels of the whole view: the plane's three parameters are shared by all cells.
+    /// Pixels of the whole view: all cells share the plane's three parameters.
     pub view_pixels: f64,
     pub per_frame_planes: bool,
 }
 
 const PLANE_PARAMETERS: f64 = 3.0;
-/// The plane cannot have absorbed more than this share of the variance: beyond, the residual is
-/// smooth error rather than correlated noise, and the count of parameters says nothing.
+/// Largest share of the variance that the plane may have absorbed: beyond, the residual is a smooth error
+/// rather than correlated noise, and the count of parameters says nothing.
 const MAX_ABSORBED: f64 = 0.05;
 
 impl Context {
@@ -152,7 +152,7 @@ impl Context {
         let frames = (s.n / s.pixels.max(1.0)).max(1.0);
         let within = (self.frames >= 2.0 && s.within_dof > 0.0).then(|| s.within / s.within_dof);
         let temporal = within.map(|w| self.temporal(w, total, frames));
-        // Share of the variance that stands still from frame to frame.
+        // Share of the variance that is constant over the frames.
         let frozen = temporal.map_or(1.0, |t| (1.0 - t / total).clamp(0.0, 1.0));
         let moving_frames = 1.0 + (frames - 1.0) * self.temporal_dilution();
         let absorbed = self.absorbed(frozen, moving_frames);
@@ -185,11 +185,11 @@ impl Context {
         })
     }
 
-    /// From the variance `spatial` of a frame, the share `frozen` of it that no further frame averages
-    /// out, and what whole frames shift by, beside the variance `within` a pixel.
+    /// Standard error of the mean depth, from the variance `spatial` of a frame, its share `frozen` that more
+    /// frames do not average out, and the shifts of whole frames beyond the variance `within` pixels.
     fn mean_std_error_m(&self, s: &Sums, spatial: f64, frozen: f64, within: f64) -> f64 {
         let further = (s.n / s.pixels.max(1.0)).max(1.0) - 1.0;
-        // The mean of a first-order filter: (1 - rho)/(1 + rho) independent frames a frame.
+        // The mean of a first-order filter: (1 - rho)/(1 + rho) independent frames per frame.
         let frames = 1.0 + further * (1.0 - self.temporal_rho) / (1.0 + self.temporal_rho);
         let pixels = (s.pixels / self.correlation_sum.max(1.0)).max(1.0);
         let of_pixels = spatial * (frozen + (1.0 - frozen) / frames) / pixels;
@@ -198,8 +198,8 @@ impl Context {
         (of_pixels + of_frames).sqrt()
     }
 
-    /// Squares between the frames' means beyond what noise makes; nothing below three of its own
-    /// standard errors, for half of all chi-squares lie above their mean.
+    /// Sum of squares between the frames' means beyond noise; zero within three standard errors of noise,
+    /// because about half of all chi-squares exceed their mean.
     fn beyond_chance(&self, s: &Sums, within: f64) -> f64 {
         const CLEARLY: f64 = 3.0;
         let freedom = (self.frames - 1.0).max(0.0) * s.bins.max(1.0);
@@ -208,30 +208,30 @@ impl Context {
         if clear { s.between - noise * freedom } else { 0.0 }
     }
 
-    /// Independent frames per frame, for the part that changes with time: the squares of a
-    /// first-order correlation sum to (1 + rho^2) / (1 - rho^2).
+    /// Independent frames per frame, for the moving part: the squares of a first-order correlation sum to
+    /// (1 + rho^2) / (1 - rho^2).
     fn temporal_dilution(&self) -> f64 {
         let square = self.temporal_rho * self.temporal_rho;
         (1.0 - square) / (1.0 + square)
     }
 
-    /// Variance of a pixel over time, from its variance `within` a few correlated frames about
-    /// their own mean, which is short by the frames' mean correlation, and by the cut: of two
-    /// Gaussian parts of a sum, cutting the sum narrows each in proportion to its share.
+    /// Temporal variance of a pixel, from its variance `within` a few correlated frames about their mean.
+    /// That is too small by the frames' mean correlation and by the cut: cutting the sum of two Gaussian
+    /// parts narrows each in proportion to its share.
     fn temporal(&self, within: f64, total: f64, frames: f64) -> f64 {
         let moving = (within / total).clamp(0.0, 1.0);
         let cut = 1.0 - (1.0 - self.cut_factor) * moving;
         within / cut / (1.0 - mean_correlation(self.temporal_rho, frames))
     }
 
-    /// Of the squares between frames, those beyond what noise correlated between neighbours makes
-    /// by itself: a shift of the whole frame, which is no spread over the pixels.
+    /// Sum of squares between frames beyond that of noise correlated between neighbours: shifts of whole
+    /// frames, which are no spread over the pixels.
     fn shared_by_a_frame(&self, s: &Sums, within: f64) -> f64 {
         let by_noise = (self.frames - 1.0) * within * self.correlation_sum.min(s.pixels);
         (s.between - by_noise).max(0.0)
     }
 
-    /// Share of one frame's variance that the plane fit took away.
+    /// Share of one frame's variance that the plane fit absorbed.
     fn absorbed(&self, frozen: f64, moving_frames: f64) -> f64 {
         let per_plane = PLANE_PARAMETERS * self.correlation_sum / self.view_pixels.max(1.0);
         let share =
@@ -240,15 +240,15 @@ impl Context {
     }
 }
 
-/// Mean correlation between two different ones of `frames` frames of a first-order filter.
+/// Mean correlation between different frames, of `frames` frames of a first-order filter.
 fn mean_correlation(rho: f64, frames: f64) -> f64 {
     let n = frames.round().max(2.0);
-    // The sum of (n - k) rho^k over k = 1 .. n - 1, closed.
+    // The sum of (n - k) rho^k over k = 1 .. n - 1, in closed form.
     let sum = rho * (n * (1.0 - rho) - (1.0 - rho.powf(n))) / (1.0 - rho).powi(2);
     (2.0 * sum / (n * (n - 1.0))).clamp(0.0, MAX_SHARED)
 }
 
-/// A filter slower than the view leaves too little of its noise to be scaled up honestly.
+/// Largest mean correlation corrected: a filter slower than the view leaves too little noise to scale up.
 const MAX_SHARED: f64 = 0.8;
 
 #[cfg(test)]
@@ -289,18 +289,18 @@ mod tests {
         assert!((white.n_effective - 10_000.0).abs() < 1.0, "{white:?}");
         let frozen = context.cell(&Sums { within: 0.0, ..base }).unwrap();
         assert!((frozen.n_effective - 1000.0).abs() < 1.0, "{frozen:?}");
-        // Of a unit variance: the mean over 10,000 readings, and over the 1000 that differ.
+        // With unit variance: the mean over 10,000 readings, and over the 1000 different ones.
         assert!((white.mean_std_error_m - 0.01).abs() < 1e-4, "{white:?}");
         assert!((frozen.mean_std_error_m - 1000f64.powf(-0.5)).abs() < 1e-4, "{frozen:?}");
-        // Ten frames that jump by a variance of 0.12 as wholes leave a tenth of it in the mean; noise
-        // makes the 9 beside their squares.
+        // Ten frames that jump as a whole with a variance of 0.12 leave a tenth of it in the mean; noise
+        // adds 9 to their sum of squares.
         let between = 1000.0 * 9.0 * 0.12 + 9.0;
         let jumping = context.cell(&Sums { within: 9000.0, between, ..base }).unwrap();
         let expected = 0.012 + (1.0 - 0.108) * 1e-4;
         assert!((jumping.mean_std_error_m.powi(2) - expected).abs() < 1e-6, "{jumping:?}");
     }
 
-    /// Against the plain double sum.
+    /// Compares with the plain double sum.
     #[test]
     fn the_mean_correlation_is_the_mean_over_pairs() {
         for (rho, n) in [(0.0, 5), (0.3, 2), (0.6, 7), (0.8, 4)] {

@@ -1,58 +1,59 @@
-//! The steps of a Kinect's columns, from one depth image alone.
+//! Detects the column steps of a Kinect from a single depth image.
 //!
 //! Its firmware corrects the disparity linearly over the columns (GmcMode in OpenNI), in whole steps of the
-//! read-out and anew for every image: whole columns differ by a step from the next, at even distances
-//! from a step at the middle column or next to it. No surface steps by as much at one column in all rows, so
-//! that no plane is needed to see them.
+//! read-out and anew for every image. Whole columns therefore step at even distances, counted from a step at
+//! the middle column or next to it. No surface steps by as much at one column in all rows, so no plane is
+//! needed to see them.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::stats::{MAD_TO_SIGMA, median};
 
-/// Steps at even distances about the middle of the picture.
+/// Steps at even distances from the middle of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColumnSteps {
     pub period_px: f64,
-    /// What the disparity changes by from a column to the next on the right, px.
+    /// Change of the disparity at a step, from left to right, px.
     pub step_px: f64,
     /// Mean of the steps over its standard error.
     pub t: f64,
-    /// Where the step of the middle would lie between two columns, px: the next column is the first beyond it.
+    /// Position of the middle step between two columns, px: the next column is the first beyond it.
     middle_px: f64,
 }
 
-/// A Kinect v1 reads the disparity out in eighths of a px, on 640 columns.
+/// Read-out step of a Kinect v1 as a share of the width: an eighth of a px on 640 columns.
 const READ_OUT_PX: f64 = 1.0 / 8.0 / 640.0;
-/// Columns either side that a step is seen on, and located on: to see one, the noise of more is less.
+/// Columns on either side used to detect a step (more average the noise), and to locate it.
 const REACH: usize = 4;
 const NEXT: usize = 1;
-/// Read-out steps over which one side is no longer smooth, and both together no step of the firmware.
+/// Largest change within a smooth side, and largest step of the firmware between both, in read-out steps.
 const ROUGH: f64 = 2.0;
 const TORN: f64 = 3.0;
-/// A row counts by no more, in read-out steps.
+/// A row's step is clipped to this, in read-out steps.
 const CLIP: f64 = 1.5;
-/// Of all rows, so many must show a column.
+/// Least share of rows that must show a column.
 const MIN_ROWS: f64 = 1.0 / 16.0;
 const MIN_EDGES: usize = 3;
-/// The middle and the outermost steps are tried at such parts of a column.
+/// Resolution of the search for the middle and outermost steps, columns.
 const FINE: f64 = 1.0 / 16.0;
-/// An image without noise scatters by no less, in read-out steps: what is left of a mean of rounded numbers.
+/// Floor of the scatter of an image without noise, in read-out steps: the rounding left in a mean of rounded
+/// numbers.
 const ROUNDING: f64 = 1e-3;
-/// Periods that are tried, as parts of the width: two Kinects' lie at 41 to 110 of 640 px (72 images).
+/// Periods tried, as shares of the width: those of two Kinects are 41 to 110 of 640 px (72 images).
 const PERIODS: [f64; 2] = [1.0 / 26.0, 1.0 / 3.2];
-/// All 72 images of two Kinects lie at 9.6 to 63; 157 simulated ones without, most of them with other effects,
-/// at 5.0 or less.
+/// Threshold of t: 9.6 to 63 in 72 images of two Kinects; 5.0 or less in 157 simulated ones without steps,
+/// most of them with other effects.
 const CLEAR: f64 = 8.0;
-/// Half of the steps rise by more, in read-out steps: 38 images of a Kinect by .87 or more and one by .51; steep
-/// boards, whose near columns are noisier than the far ones and pass for steps in their mean, by .05 or less.
+/// Threshold of the median rise at the steps, in read-out steps: 0.87 or more in 38 images of a Kinect and
+/// 0.51 in one; 0.05 or less for steep boards, whose noisier near columns pass for steps in their mean.
 const WHOLE: f64 = 0.4;
-/// The largest of those 157 are as those of so many independent Gaussian ones whose deviation is so large
-/// (half of them beyond 2.8, a hundredth beyond 4.4).
+/// Null distribution of t: the largest values of those 157 images match the maximum of this many independent
+/// Gaussians of this standard deviation (half of them beyond 2.8, a hundredth beyond 4.4).
 const LOOKS: f64 = 270.0;
 const WIDER: f64 = 1.25;
 
 impl ColumnSteps {
-    /// Of an image of disparities, px, NaN where there is none; `None` where no steps are clear.
+    /// Searches an image of disparities, px, NaN where there is none; `None` where no steps are significant.
     pub fn find(disparity: &[f32], width: usize) -> Option<Self> {
         let unit = READ_OUT_PX * width as f64;
         let steps = rises(disparity, width, unit, REACH);
@@ -63,14 +64,14 @@ impl ColumnSteps {
         let middle = median(&mut seen);
         let mut off: Vec<f64> = seen.iter().map(|s| (s - middle).abs()).collect();
         let spread = (MAD_TO_SIGMA * median(&mut off)).max(ROUNDING * unit);
-        // The outermost edges move by half a px from one period to the next.
+        // The outermost edges move by half a px from one trial period to the next.
         let [first, last] = PERIODS.map(|p| (p * width as f64).ln());
         let finer = 1.0 / width as f64;
         let tried =
             (0..=((last - first) / finer) as usize).map(|k| (first + k as f64 * finer).exp());
         let half = width as f64 / 2.0;
         let score = |period: f64| {
-            // The nearest columns.
+            // At the nearest columns.
             let edges = edges(&steps, [half - 0.5, period]);
             let (n, sum) = edges.fold((0, 0.0), |(n, s), e| (n + 1, s + e));
             let t = (sum / n as f64 - middle) * (n as f64).sqrt() / spread;
@@ -88,13 +89,13 @@ impl ColumnSteps {
         (whole > WHOLE).then_some(found)
     }
 
-    /// What the disparity of a column errs by, px: the steps less the line that they stand for.
+    /// Error of a column's disparity, px: the steps less the line that they approximate.
     pub fn error_px(&self, column: usize) -> f64 {
         let steps = (column as f64 - self.middle_px) / self.period_px;
         self.step_px * (steps.floor() - steps + 0.5)
     }
 
-    /// Chance that an image without steps shows as much.
+    /// p-value: the probability that an image without steps shows as much.
     pub fn p(&self) -> f64 {
         (LOOKS * Normal::standard().sf(self.t / WIDER)).clamp(1e-300, 1.0)
     }
@@ -104,19 +105,19 @@ fn finite(rises: &[f64]) -> Vec<f64> {
     rises.iter().copied().filter(|rise| rise.is_finite()).collect()
 }
 
-/// Of all columns' rises, those at the steps.
+/// The rises of the columns at the steps.
 fn edges(rises: &[f64], [middle, period]: [f64; 2]) -> impl Iterator<Item = f64> {
     let reach = (rises.len() as f64 / 2.0 / period) as i64;
     let columns = (-reach..=reach).map(move |k| (middle + k as f64 * period).ceil() as usize);
     columns.filter_map(|u| rises.get(u).copied()).filter(|rise| rise.is_finite())
 }
 
-/// The middle and the period with steps where the columns rise most, from one column to the next. Of all that put
-/// them at the same columns, the mean.
+/// The middle and the period whose steps are at the largest rises between adjacent columns; the mean of all
+/// that give equally large rises.
 fn located(rises: &[f64], period_px: f64) -> [f64; 2] {
     let half = rises.len() as f64 / 2.0;
     let reach = (half / period_px).floor();
-    // The step of the middle, and the outermost, up to so many columns off.
+    // Offsets of the middle step and of the outermost, up to this many columns.
     let off = |columns: f64| {
         let n = (columns / FINE) as i32;
         (-n..=n).map(|k| f64::from(k) * FINE)
@@ -128,8 +129,8 @@ fn located(rises: &[f64], period_px: f64) -> [f64; 2] {
     [0, 1].map(|k| alike.iter().map(|a| a[k]).sum::<f64>() / alike.len() as f64)
 }
 
-/// What each column and the next ones on its right lie above those on its left, `reach` of them, mean over the
-/// rows, px; NaN where few rows are smooth.
+/// Rise at each column: the mean of the `reach` columns from it on less that of those before, without the
+/// slope; mean over the rows, px. NaN where few rows are smooth.
 fn rises(disparity: &[f32], width: usize, unit: f64, reach: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); width];
     for row in disparity.chunks_exact(width) {
@@ -140,7 +141,7 @@ fn rises(disparity: &[f32], width: usize, unit: f64, reach: usize) -> Vec<f64> {
             let apart = (sum(right) - sum(left)) / reach as f64;
             let smooth = rises.iter().all(|r| r.abs() <= ROUGH * unit) && apart.abs() < TORN * unit;
             if smooth && apart.is_finite() {
-                // A single column has none.
+                // A single column on each side has no slope.
                 let slope = 0.5 * (rises[0] + rises[1]) / (reach.max(2) - 1) as f64;
                 let step = apart - slope * reach as f64;
                 let (sum, n) = &mut sums[u + reach];
@@ -166,7 +167,7 @@ mod tests {
     const HEIGHT: usize = 240;
     const STEP_PX: f64 = 0.125;
 
-    /// A tilted wall, and a box in front of it, in eighths of a px.
+    /// Disparities of a tilted wall with a box in front of it, in eighths of a px.
     fn image(rng: &mut Stream, stretch_px: impl Fn(f64) -> f64) -> Vec<f32> {
         let tilt: f64 = rng.random_range(-0.01..0.01);
         let mut pixel = |i: usize| {
@@ -191,15 +192,15 @@ mod tests {
                 assert_eq!(found.step_px, sign * STEP_PX);
                 let line = |u: usize| sign * STEP_PX * ((u as f64 - middle) / period - 0.5);
                 let off = |u: usize| stretch(u as f64) - line(u) - found.error_px(u);
-                // Not even one column is taken for its neighbour.
+                // No column is off by even one.
                 let largest = (0..WIDTH).map(|u| off(u).abs()).fold(0.0, f64::max);
                 assert!(largest < 0.05 * STEP_PX, "{largest}");
             }
         }
     }
 
-    /// A board turned away before a wall, seen by a sensor whose noise grows with the disparity: of its near
-    /// columns only rows that chance made smooth are looked at, and they lean one way.
+    /// A steep board in front of a wall, seen by a sensor whose noise grows with the disparity. In its near
+    /// columns only rows that are smooth by chance count, and they are biased.
     #[test]
     fn noisy_columns_are_no_steps() {
         let mut rng = Seed(4).stream("column-steps/steep");

@@ -1,19 +1,19 @@
-//! Depth bins of a view that show something else than the target's noise.
+//! Detects depth bins of a view that show something other than the target's noise.
 //!
-//! Noise changes little from one bin of depth to the next (a twentieth in depth), so a bin that
-//! scatters far more than those before it, or lies off the plane as a whole, sees another thing:
-//! a wall behind the board's far edge, a hand at its rim.
+//! Noise changes little from one bin of depth to the next (5 % in depth), so a bin that scatters far more
+//! than those before it, or is off the plane as a whole, sees something else: a wall behind the board's far
+//! edge, a hand at its rim.
 
 use super::cells::Cell;
 
-/// A bin may scatter this many times as much, in inverse depth, as the ones next to it. Noise
-/// ~ z^2 gives 1; Eq. 1 near 0.5 m gives 0.9; lens errors of Herrera's real views reach 1.7.
+/// Allowed ratio of a bin's scatter, in inverse depth, to that of its neighbours. Noise ~ z^2 gives 1, Eq. 1
+/// near 0.5 m gives 0.9, and lens errors of Herrera's real views reach 1.7 ...
 const TIMES_NEIGHBOURS: f64 = 2.0;
-/// ... beyond what its own standard error explains.
+/// ... plus this many of its own standard errors.
 const STANDARD_ERRORS: f64 = 3.0;
-/// A bin's mean may be off by this many standard deviations: none of Herrera's real views is.
+/// Allowed offset of a bin's mean, standard deviations: none of Herrera's real views exceeds it.
 const MEAN_SIGMAS: f64 = 2.0;
-/// Bins towards the middle of the view with which one is compared: their median.
+/// Bins towards the middle of the view with whose median a bin is compared.
 const COMPARED: usize = 3;
 
 /// One bin and the mean of its axial residual, m.
@@ -22,8 +22,8 @@ pub(super) struct Bin {
     pub mean_m: f64,
 }
 
-/// Why each bin is doubtful; `None` for those that are the target's noise. Compared
-/// from the largest bin outwards, so that a doubtful one never excuses the next.
+/// Why each bin is doubtful; `None` for those that show the target's noise. Compared from the largest bin
+/// outwards with trusted ones only, so that a doubtful one never excuses the next.
 pub(super) fn doubts(bins: &[Bin]) -> Vec<Option<String>> {
     let mut doubts: Vec<Option<String>> = bins.iter().map(|_| None).collect();
     let Some(middle) = (0..bins.len()).max_by_key(|&k| bins[k].cell.n) else { return doubts };
@@ -41,7 +41,7 @@ pub(super) fn doubts(bins: &[Bin]) -> Vec<Option<String>> {
     doubts
 }
 
-/// Sigma in inverse depth, 1/m: alike in neighbouring bins.
+/// Sigma in inverse depth, 1/m, which is similar in neighbouring bins.
 fn roughness(cell: &Cell) -> f64 {
     cell.spread.spatial_m / (cell.z_m * cell.z_m)
 }
@@ -105,7 +105,7 @@ mod tests {
         let mut bins: Vec<Bin> = (0..10).map(|k| bin(2.0, 0.008, 0.0, 1000 - k)).collect();
         bins[7] = bin(2.4, 0.012 * 5.8, 0.02, 400);
         bins[8] = bin(2.5, 0.013 * 4.0, -0.03, 400);
-        // As wide as its neighbours, but all of it 3 sigma behind the plane.
+        // Scatters like its neighbours about its own mean, which is 3 sigma behind the plane.
         bins[0] = bin(1.9, 0.0253, 0.024, 400);
         let doubted = doubts(&bins);
         let which: Vec<usize> = (0..10).filter(|&k| doubted[k].is_some()).collect();

@@ -1,4 +1,4 @@
-//! What the sums of a view's frames come to.
+//! Turns the sums over a view's frames into its result.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,8 +13,8 @@ use crate::residual::perpendicular_per_axial;
 use crate::stats::{Correlation, measure_correlation, normal_cut_factor};
 
 impl Scan<'_> {
-    /// Refit on all frames, and turn the sums into the view's result (names and notes are the
-    /// caller's). `None` when nothing was measured.
+    /// Refits the plane to all frames, and turns the sums into the view's result (the caller adds names and
+    /// notes). `None` when nothing was measured.
     pub fn finish(self, target: &Target, first: &Frame) -> Option<ViewMeasurement> {
         let frames = self.lagged.frames;
         let plane = match self.bench.options.planes {
@@ -38,7 +38,7 @@ impl Scan<'_> {
         }));
         let whole = context.cell(&trusted)?;
         let axis_distance_m = plane.depth(0.0, 0.0);
-        // The same error of the inverse depth, at another depth.
+        // The same error in inverse depth, converted to another depth.
         let to_axis = (axis_distance_m / whole.z_m).powi(2);
         Some(ViewMeasurement {
             name: String::new(),
@@ -67,8 +67,8 @@ impl Scan<'_> {
         })
     }
 
-    /// Standard error of the plane on the optical axis over that at the middle of the pixels: a plane
-    /// is affine in the ray, and less sure away from what it was fitted to.
+    /// Standard error of the plane on the optical axis over that at the centroid of the pixels: a plane is
+    /// affine in the ray, and less certain away from the pixels it was fitted to.
     fn axis_lever(&self) -> f64 {
         let mut normal = Matrix3::zeros();
         let seen = self.pixels.iter().zip(&self.count).filter(|(_, n)| **n > 0);
@@ -81,7 +81,7 @@ impl Scan<'_> {
         normal.try_inverse().map_or(1.0, |inverse| (pixels * inverse[(2, 2)]).max(1.0).sqrt())
     }
 
-    /// The robust plane through the mean of all frames.
+    /// Fits a robust plane to the mean of all frames.
     fn refit(&self, target: &Target) -> Plane {
         let mut w = vec![f32::NAN; self.bench.sensor.camera.pixels()];
         let min_readings = (self.lagged.frames as u32 / 4).max(1);
@@ -103,7 +103,7 @@ impl Scan<'_> {
         .map_or(self.plane, |fit| fit.plane)
     }
 
-    /// By how much the expected depth of each pixel rose with the refit, m.
+    /// Change of each pixel's expected depth by the refit, m.
     fn shift_to(&self, plane: &Plane) -> Vec<f64> {
         if self.bench.options.planes == Planes::PerFrame {
             return vec![0.0; self.pixels.len()];
@@ -161,7 +161,7 @@ impl Scan<'_> {
         }
     }
 
-    /// Of the first frame's residual, each in units of its cell's standard deviation.
+    /// Correlation of the first frame's residuals, each in units of its cell's standard deviation.
     fn correlation(&self, first: &Frame, plane: &Plane, sums: &[Sums]) -> Correlation {
         let camera = &self.bench.sensor.camera;
         let mut field = vec![f32::NAN; camera.pixels()];
@@ -202,7 +202,7 @@ impl Scan<'_> {
     }
 }
 
-/// The cells that show the target's noise, their sums as one, and why the others do not.
+/// The cells that show the target's noise, their merged sums, and why the others do not.
 fn trusted_cells(sums: &[Sums], context: &Context) -> (Vec<Cell>, Sums, Vec<String>) {
     let (bins, sums): (Vec<Bin>, Vec<&Sums>) = sums
         .iter()
@@ -221,10 +221,10 @@ fn trusted_cells(sums: &[Sums], context: &Context) -> (Vec<Cell>, Sums, Vec<Stri
     (cells, whole, notes)
 }
 
-/// Enough to see a lens's bowl and a firmware's bands; 77 kB a view.
+/// Largest width, px: enough to show a lens's bowl and a firmware's bands, in 77 kB per view.
 const PICTURE_WIDTH: usize = 160;
 
-/// Take the mean out: what a frame shares as a whole is not correlation between pixels.
+/// Subtracts the mean: an offset of the whole frame is not correlation between pixels.
 fn centre(field: &mut [f32]) {
     let (mut sum, mut n) = (0f64, 0f64);
     for e in field.iter().filter(|e| e.is_finite()) {

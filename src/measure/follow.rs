@@ -1,27 +1,27 @@
-//! Where the target is in each frame, beside where the first frames show it: a cut of the tails that stood still
-//! would take a drifting target's noise on one side only.
+//! Follows the target's offset in each frame from its position in the first frames: with a fixed cut, a
+//! drifting target would lose noise on one side only.
 
 use super::grouping::CUT_SIGMAS;
 use crate::stats::median_in_place;
 
-/// Among fewer frames than this nobody knows which one is wrong.
+/// Fewest frames among which the wrong one can be told.
 pub(super) const MAJORITY: usize = 3;
-/// A cell that is off by less than this share of its cut, a quarter of a standard deviation, stays where it is:
-/// the cut then takes 0.1 % off sigma.
+/// Offsets below this share of the cut, a quarter of a standard deviation, are ignored: they change sigma by
+/// 0.1 %.
 pub(super) const NO_SHIFT: f32 = 0.07;
-/// A drift of fewer standard deviations is not worth a note.
+/// Least drift that is noted, standard deviations.
 const NOTED_SIGMAS: f32 = 1.0;
-/// Standard errors by which a drift is clear of frames that jitter: of eight frames t has two degrees of freedom, and
-/// one in forty is beyond; a steady drift has 8.
+/// Standard errors that tell a drift from jitter. With eight frames t has two degrees of freedom and exceeds
+/// this once in forty; a steady drift has t = 8.
 const CLEARLY: f32 = 6.0;
 
-/// What is known of where the cells were, m.
+/// Offsets of the cells over the frames, m.
 pub(super) struct Follow {
-    /// Frames that the cuts come from.
+    /// Frames from which the cuts were found.
     pub held: usize,
     /// Mean residual of each cell in them.
     pub usual: Vec<f32>,
-    /// Offset of each cell in the frame last taken.
+    /// Offset of each cell in the last accepted frame.
     pub last: Vec<f32>,
     /// Offset of the largest cell in each frame, as a share of its cut.
     pub path: Vec<f32>,
@@ -32,16 +32,15 @@ impl Follow {
         Follow { held, usual: vec![0.0; cells], last: vec![0.0; cells], path: Vec::new() }
     }
 
-    /// Of a cell whose mean residual is `mean`. A target that drifts is near where it was in the frame before;
-    /// what is near neither that nor its usual place is not followed.
+    /// Offset of a cell whose mean residual is `mean`. A drifting target is near its position in the frame
+    /// before; an offset near neither that nor the usual position is not followed.
     pub fn offset(&self, cell: usize, mean: f32, cut: f32) -> f32 {
         let offset = mean - self.usual[cell];
         let near = offset.abs().min((offset - self.last[cell]).abs()) < cut;
         if near { offset } else { 0.0 }
     }
 
-    /// By how many standard deviations the last quarter of the frames lies off the first, if by more than frames
-    /// that jitter do.
+    /// Drift from the first to the last quarter of the frames, in standard deviations, if it exceeds jitter.
     pub fn drift_sigmas(&self) -> Option<f32> {
         let quarter = self.path.len() / 4;
         if quarter < 2 {

@@ -1,4 +1,4 @@
-//! A view's target, and its frames one after the other: those that can be read and tell something new.
+//! Finds a view's target and iterates over its frames, skipping unreadable and repeated ones.
 
 use super::Workbench;
 use super::follow::MAJORITY;
@@ -11,7 +11,7 @@ use crate::io::FrameSource;
 use crate::plane::{InverseDepthImage, Target, find_target};
 use crate::view::{FrameRef, View};
 
-/// Hands out the frames that can be read and do not repeat the one before; the others are told in the notes.
+/// Iterates over the frames that can be read and do not repeat the one before; notes name the others.
 pub(super) struct FrameReader<'v> {
     frames: std::iter::Enumerate<std::slice::Iter<'v, FrameRef>>,
     source: FrameSource,
@@ -34,7 +34,7 @@ impl<'v> FrameReader<'v> {
         }
     }
 
-    /// What was odd about the frames read, and the hash of their bytes.
+    /// Notes on the frames read, and the hash of their bytes.
     pub fn finish(self, view: &View) -> (Vec<String>, [u8; 32]) {
         let (repeated, total) = (self.repeated, view.depth.len());
         let told = (repeated > 0).then(|| {
@@ -58,7 +58,7 @@ impl<'v> FrameReader<'v> {
 }
 
 impl Iterator for FrameReader<'_> {
-    /// With its number in the view.
+    /// A frame with its number in the view.
     type Item = (usize, Frame);
 
     fn next(&mut self) -> Option<(usize, Frame)> {
@@ -80,7 +80,7 @@ impl Iterator for FrameReader<'_> {
     }
 }
 
-/// The target of one view, from its first frames.
+/// Finds the target of a view in its first frames.
 pub fn view_target(view: &View, bench: &Workbench<'_>) -> Result<Target> {
     let (_, held) = FrameReader::of(view, bench).hold(view)?;
     target_of(view, bench, &held)
@@ -113,33 +113,33 @@ pub(super) fn failed(view: &View, what: String, remedy: &'static str) -> Error {
     Error::View { view: view.name.clone(), what, remedy }
 }
 
-/// Frames that were not handed out, and why.
+/// Numbers of frames left out, by reason.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LeftOut {
-    /// Word for word the one before.
+    /// Identical to the frame before.
     pub repeated: usize,
-    /// They show the target elsewhere than the other first frames do.
+    /// They show the target elsewhere than the other first frames.
     pub stale: usize,
-    /// They cannot be read, or carry no depth.
+    /// They cannot be read, or have no depth.
     pub lost: usize,
 }
 
 /// The frames that show a view's target, with their numbers in the view.
 ///
-/// Frames that repeat the one before are left out, unless all of the view are alike; so are a few of the first ones
-/// in which most of the target is elsewhere. Later ones stay: what moves is for the diagnosis to tell.
+/// Frames that repeat the one before are left out, unless all frames of the view are equal. So are a few of
+/// the first ones in which most of the target is elsewhere. Later ones stay: motion is left to the diagnosis.
 pub struct TargetFrames<'v> {
     first: Box<dyn Iterator<Item = (usize, Frame)> + 'v>,
     stale: usize,
     reader: FrameReader<'v>,
 }
 
-/// One stale frame is usual where a recording begins; of eight, a second may be. Where more of the first frames show
-/// the target elsewhere, it moves or they jitter.
+/// Stale frames at most at the beginning of a recording: usually one, of eight frames perhaps two. Where more
+/// show the target elsewhere, it moves or they jitter.
 const MAX_STALE: [usize; 2] = [1, 2];
 
 impl<'v> TargetFrames<'v> {
-    /// And the target. An error when no frame can be read or none shows a plane.
+    /// Finds the target and its frames. Fails when no frame can be read or none shows a plane.
     pub fn of(view: &'v View, bench: &'v Workbench<'_>) -> Result<(Target, Self)> {
         let mut reader = FrameReader::of(view, bench);
         let (numbers, mut held) = reader.hold(view)?;
@@ -164,7 +164,7 @@ impl<'v> TargetFrames<'v> {
         Ok((target, TargetFrames { first: Box::new(first), stale, reader }))
     }
 
-    /// Of the frames up to here.
+    /// Frames left out so far.
     pub fn left_out(&self) -> LeftOut {
         let FrameReader { repeated, notes, .. } = &self.reader;
         LeftOut { repeated: *repeated, stale: self.stale, lost: notes.len() }

@@ -1,4 +1,4 @@
-//! The target's pixels grouped by depth, what depth each should show, and how far off is too far.
+//! Groups the target's pixels by depth, and finds the quantisation step and the robust scale of a cell.
 
 use super::Workbench;
 use super::cells::Bins;
@@ -6,14 +6,14 @@ use crate::frame::DepthTable;
 use crate::plane::{MAD_TO_SIGMA, Plane};
 use crate::stats::{median_in_place, normal_cut_factor, range};
 
-/// Residuals beyond this many standard deviations of their cell are gross errors; the variance
-/// of what is kept is divided by [`normal_cut_factor`], 0.994.
+/// Residuals beyond this many standard deviations of their cell are gross errors; the variance of the
+/// others is divided by [`normal_cut_factor`], 0.994.
 pub(super) const CUT_SIGMAS: f64 = 3.5;
-/// Cells with fewer pixels than this join their neighbour.
+/// Cells with fewer pixels than this are merged with their neighbour.
 const MIN_CELL_PIXELS: usize = 150;
 const CUT_ROUNDS: usize = 6;
 
-/// The target's pixels sorted into bins of depth; small bins join their neighbour.
+/// Sorts the target's pixels into bins of depth, merging small ones: the pixels, and where each cell starts.
 pub(super) fn by_cell(
     pixels: &[u32],
     plane: &Plane,
@@ -46,10 +46,9 @@ pub(super) fn by_cell(
     (sorted, starts)
 }
 
-/// Words from one step of the sensor to the next: 1 where every word occurs; more where a driver stores, as
-/// millimetres, what steps by an eighth of a pixel. The lower quartile of the gaps between words that occur,
-/// each as often as the rarer of its two: gaps between surfaces count for little. Of two words that may be two
-/// surfaces no step is told.
+/// Raw words per step of the sensor: 1 where every word occurs, more where a driver stores steps of an eighth
+/// of a pixel as millimetres. It is the lower quartile of the gaps between occurring words, each weighted by
+/// the rarer of its two words, so that gaps between surfaces count little. Two words may be two surfaces: 1.
 pub(crate) fn words_a_step(words: impl Iterator<Item = u16>, table: &DepthTable) -> f64 {
     let mut counts = vec![0u64; 1 << 16];
     words.for_each(|word| counts[usize::from(word)] += 1);
@@ -70,7 +69,7 @@ pub(crate) fn words_a_step(words: impl Iterator<Item = u16>, table: &DepthTable)
     quartile.map_or(1.0, |gap| gap.0 as f64)
 }
 
-/// Standard deviation inside +-[`CUT_SIGMAS`] of itself, corrected for the cut.
+/// Standard deviation within +-[`CUT_SIGMAS`] of itself, corrected for the cut.
 pub(super) fn settled_scale(residuals: Vec<f32>, min_scale: f64) -> f64 {
     let mut off: Vec<f32> = residuals.iter().map(|e| e.abs()).collect();
     let mad = f64::from(median_in_place(&mut off));
@@ -103,7 +102,7 @@ mod tests {
     use crate::rng::Seed;
     use rand_distr::{Distribution, Normal};
 
-    /// Of a wall at 1.5 m in a wide room, in millimetres, with noise of 3 mm, half of a coarse step.
+    /// A wall at 1.5 m in a wide room, in millimetres, with noise of 3 mm, half of a coarse step.
     #[test]
     fn steps_of_the_sensor_are_met_in_its_words() {
         let mut rng = Seed(3).stream("words");

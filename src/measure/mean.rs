@@ -1,4 +1,4 @@
-//! The mean of a view's first frames, pixel by pixel, in which one bad frame counts for little.
+//! Robust mean of a view's first frames, pixel by pixel.
 
 use super::Workbench;
 use super::follow::MAJORITY;
@@ -6,17 +6,18 @@ use crate::frame::{DepthTable, Frame};
 use crate::plane::MAD_TO_SIGMA;
 use crate::stats::median_in_place;
 
-/// A reading so many usual deviations from the median of its pixel shows another scene.
+/// A reading shows another scene if it is this many typical standard deviations from its pixel's median ...
 const STRAY_SIGMAS: f32 = 10.0;
-/// ... if it is so many steps of the sensor from it, too.
+/// ... and also this many steps of the sensor.
 const STRAY_STEPS: f32 = 3.0;
-/// Pixels that tell the usual deviation.
+/// Pixels sampled for the typical standard deviation.
 const ASKED: usize = 5000;
-/// A frame with a larger share of strays is left out whole: where its scene crosses the right one it has none.
+/// A frame with a larger share of strays is left out entirely: it has none where its scene crosses the right
+/// one.
 const MAX_STRAYS: f64 = 0.2;
 
-/// Mean over the frames, where at least half of them measured; 1/m, NaN elsewhere. Of three readings or more
-/// those far from their median do not count: a stale or damaged frame would move the target.
+/// Mean over the frames, 1/m, where at least half of them have a depth; NaN elsewhere. With three readings or
+/// more, those far from their median do not count: a stale or damaged frame would move the target.
 pub(super) fn mean_inverse_depth(
     frames: &[Frame],
     bench: &Workbench<'_>,
@@ -42,8 +43,8 @@ pub(super) fn mean_inverse_depth(
     (0..seen.sum.len()).map(mean).collect()
 }
 
-/// Some pixels, spread over the picture: the median over their frames, 1/m, and what each frame is off it, NaN where it
-/// has no depth.
+/// Samples pixels spread over the picture: for each, the median over the frames, 1/m, and each frame's
+/// difference from it, NaN where it has no depth.
 fn asked(frames: &[Frame], table: &DepthTable) -> Vec<(f32, Vec<f32>)> {
     let pixels = frames[0].raw.len();
     let of_pixel = |i: usize| {
@@ -55,7 +56,7 @@ fn asked(frames: &[Frame], table: &DepthTable) -> Vec<(f32, Vec<f32>)> {
     (0..pixels).step_by((pixels / ASKED).max(1)).map(of_pixel).collect()
 }
 
-/// The frames less those that show another scene than most do.
+/// The frames without those that show another scene than most.
 fn of_one_scene<'f>(
     frames: &'f [Frame],
     asked: &[(f32, Vec<f32>)],
@@ -77,20 +78,20 @@ fn of_one_scene<'f>(
     if 2 * kept.len() > frames.len() { kept } else { frames.iter().collect() }
 }
 
-/// Inverse depths that a pixel shows in its frames, 1/m.
+/// Inverse depths of a pixel over the frames, 1/m.
 fn readings(frames: &[&Frame], table: &DepthTable, pixel: usize) -> Vec<f32> {
     let w = frames.iter().map(|f| 1.0 / table.metres(f.raw[pixel]));
     w.filter(|w| w.is_finite()).collect()
 }
 
-/// What a reading is off the median of its pixel by, 1/m: the middle over the picture, as a standard deviation.
+/// Typical standard deviation of a reading about its pixel's median, 1/m: the median over the picture.
 fn usual_scatter(asked: &[(f32, Vec<f32>)]) -> f32 {
     let off = asked.iter().flat_map(|(_, off)| off).map(|off| off.abs());
     let mut off: Vec<f32> = off.filter(|off| off.is_finite()).collect();
     MAD_TO_SIGMA as f32 * median_in_place(&mut off)
 }
 
-/// Mean of those that are no farther from their median than `far`, or than so noisy a place scatters.
+/// Mean of the readings within `far` of their median, or within the scatter of a noisier pixel.
 fn without_strays(mut w: Vec<f32>, far: f32) -> f32 {
     let median = median_in_place(&mut w.clone());
     let mut off: Vec<f32> = w.iter().map(|w| (w - median).abs()).collect();
@@ -99,7 +100,7 @@ fn without_strays(mut w: Vec<f32>, far: f32) -> f32 {
     w.iter().sum::<f32>() / w.len() as f32
 }
 
-/// Of the inverse depths of each pixel over the frames, 1/m.
+/// Statistics of each pixel's inverse depths over the frames, 1/m.
 struct Seen {
     sum: Vec<f32>,
     count: Vec<u8>,
@@ -153,7 +154,7 @@ mod tests {
         assert_eq!(mean(&[7500, 7503, 7504, 12_000, 7498]), of(&[7500, 7503, 7504, 7498]));
         assert_eq!(mean(&[7500, 7503, 7504, 0, 7498]), of(&[7500, 7503, 7504, 7498]), "a hole");
         assert!(mean(&[7500, 0, 0]).is_nan());
-        // Nobody knows which of two is right.
+        // Of two readings, either may be right.
         assert_eq!(mean(&[7500, 12_000]), of(&[7500, 12_000]));
     }
 }

@@ -1,6 +1,6 @@
-//! From one view's frames to its plane and its sigma, cell by cell.
+//! Measures the plane and the sigma of a view, cell by cell, from its frames.
 //!
-//! The first few frames find the target and the scale, the rest stream through accumulators.
+//! The first few frames give the target and the scale; all stream through accumulators.
 
 mod binned;
 mod budget;
@@ -31,13 +31,13 @@ use crate::rng::Seed;
 use crate::stats::{Budget, Correlation};
 use crate::view::Sensor;
 
-/// One plane for the still view, or a fresh one for every frame.
+/// One plane for the view, or a new one for every frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Planes {
-    /// Right for a still scene: the errors that all frames share stay in sigma.
+    /// For a static scene: errors common to all frames stay in sigma.
     #[default]
     PerView,
-    /// For a target that trembles: sigma no longer holds what moves as a whole.
+    /// For a trembling target: sigma excludes its motion as a whole.
     PerFrame,
 }
 
@@ -62,11 +62,11 @@ impl Default for MeasureOptions {
     }
 }
 
-/// Words that lie farther apart than this, 1/m, are no step of a sensor: twice an eighth of a pixel of a Kinect,
-/// whose disparity is 43.5 px at 1 m.
+/// Largest step of a sensor between raw words, 1/m: twice an eighth of a pixel of a Kinect, whose disparity
+/// is 43.5 px at 1 m.
 const COARSEST_STEP: f64 = 2.0 * 0.125 / 43.5;
 
-/// What every view of a recording shares: computed once.
+/// Data shared by all views of a recording, computed once.
 #[derive(Debug)]
 pub struct Workbench<'a> {
     pub sensor: &'a Sensor,
@@ -74,7 +74,7 @@ pub struct Workbench<'a> {
     /// From raw value to m.
     pub table: DepthTable,
     pub options: MeasureOptions,
-    /// Share of the ray's excess over the depth that raw values hold: 1 where they are ranges.
+    /// Share of the range's excess over the depth that raw values contain: 1 where they are ranges.
     pub ray_share: f64,
 }
 
@@ -94,13 +94,13 @@ impl<'a> Workbench<'a> {
     }
 }
 
-/// Step of so many words of the depth code at inverse depth `w`, 1/m.
+/// Step of `words` raw words of the depth code at inverse depth `w`, 1/m.
 pub(crate) fn sensor_step(code: &DepthCode, words: f64, w: f64) -> f64 {
     let one = if w > 0.0 { code.step_inverse(1.0 / w) } else { 0.0 };
     one.max(f64::min(words * one, COARSEST_STEP))
 }
 
-/// All that was measured in one view.
+/// All measurements of one view.
 #[derive(Debug, Clone)]
 pub struct ViewMeasurement {
     pub name: String,
@@ -109,15 +109,15 @@ pub struct ViewMeasurement {
     pub plane: Plane,
     /// Mean depth of the target's pixels, m.
     pub z_m: f64,
-    /// Between the optical axis and the plane's normal, rad.
+    /// Angle between the optical axis and the plane's normal, rad.
     pub theta_rad: f64,
     /// Image direction in which depth grows, rad; 0 along the columns.
     pub azimuth_rad: f64,
     pub whole: Cell,
-    /// The target cut into bins of depth; one bin when it is not strongly tilted.
+    /// The target divided into bins of depth; one bin when it is not strongly tilted.
     pub cells: Vec<Cell>,
     pub paper: Option<RansacPlane>,
-    /// Between neighbouring pixels' residuals.
+    /// Correlation between the residuals of neighbouring pixels.
     pub correlation: Correlation,
     /// Correlation of a pixel with itself one frame later; `None` with fewer than 4 frames.
     pub temporal_correlation: Option<f64>,
@@ -130,15 +130,15 @@ pub struct ViewMeasurement {
     pub axis_distance_m: f64,
     /// Its standard error, from the scatter of the readings, m.
     pub axis_std_error_m: f64,
-    /// Disparity in px times depth in m; nothing where the sensor has none.
+    /// Disparity in px times depth in m; `None` where the sensor has no disparity.
     pub disparity_px_m: Option<f64>,
     /// Standard uncertainty of the reference, from `view.json`, m.
     pub reference_uncertainty_m: Option<f64>,
-    /// Of [`ReferenceDistance::off_m`]; where the reference's own uncertainty is stated.
+    /// Budget of [`ReferenceDistance::off_m`], where the uncertainty of the reference is stated.
     pub distance_budget: Option<Budget>,
     /// Mean infrared amplitude of the target, in the image's own units.
     pub infrared: Option<f64>,
-    /// Of the mean residual.
+    /// Picture of the mean residual.
     pub picture: ResidualPicture,
     pub notes: Vec<String>,
     /// SHA-256 of the frames' bytes in order.
@@ -146,19 +146,19 @@ pub struct ViewMeasurement {
 }
 
 impl ViewMeasurement {
-    /// The spatial sigma of a cell in px of disparity: what a matcher errs by.
+    /// The spatial sigma of a cell in px of disparity: the noise of the matcher.
     pub fn sigma_px(&self, cell: &Cell) -> Option<f64> {
         self.disparity_px_m.map(|px_m| cell.spread.spatial_m * px_m / cell.z_m.powi(2))
     }
 
-    /// The distance on the optical axis beside the one that `view.json` gives, if it gives one.
+    /// The measured distance on the optical axis with the one in `view.json`, if it gives one.
     pub fn reference(&self) -> Option<ReferenceDistance> {
         self.reference_distance_m
             .map(|reference_m| ReferenceDistance { reference_m, measured_m: self.axis_distance_m })
     }
 }
 
-/// The view's mean residual, shrunk for looking at; NaN outside the target.
+/// The view's mean residual, downsampled for display; NaN outside the target.
 #[derive(Debug, Clone)]
 pub struct ResidualPicture {
     pub width: usize,
@@ -166,19 +166,19 @@ pub struct ResidualPicture {
     pub millimetres: Vec<f32>,
 }
 
-/// Depth of the target's plane on the optical axis, twice.
+/// Depth of the target's plane on the optical axis, as measured and by the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceDistance {
-    /// What `view.json` says, m.
+    /// From `view.json`, m.
     pub reference_m: f64,
-    /// What the fitted plane says, m.
+    /// From the fitted plane, m.
     pub measured_m: f64,
 }
 
-/// A tape is held to a case whose optical centre is not marked.
+/// Error of a tape held to a case whose optical centre is not marked, m.
 const TAPE_M: f64 = 0.005;
-/// Of the distance: twice the most by which the 30 views of a calibrated Kinect v1 whose distance
-/// is known (Herrera, Kannala and Heikkila 2012) differ, 0.46 %.
+/// Share of the distance: twice the largest difference, 0.46 %, in the 30 views of a calibrated Kinect v1
+/// with known distances (Herrera, Kannala and Heikkila 2012).
 const SCALE_SHARE: f64 = 0.01;
 
 impl ReferenceDistance {
@@ -187,12 +187,12 @@ impl ReferenceDistance {
         self.measured_m - self.reference_m
     }
 
-    /// By how much the two may differ before something is wrong, m.
+    /// Largest plausible difference of the two, m.
     pub fn tolerance_m(&self) -> f64 {
         TAPE_M + SCALE_SHARE * self.reference_m
     }
 
-    /// Do the two differ by more than both can be wrong?
+    /// Whether the two differ by more than the tolerance.
     pub fn contradicts(&self) -> bool {
         self.off_m().abs() > self.tolerance_m()
     }

@@ -1,4 +1,4 @@
-//! The streaming pass: residuals of the target's pixels, frame by frame, into sums.
+//! The streaming pass: sums the residuals of the target's pixels, frame by frame.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,24 +9,24 @@ use crate::frame::Frame;
 use crate::plane::{Plane, Target};
 use crate::residual::perpendicular_per_axial;
 
-/// Frames held while the target and the scale are found; more would not make them surer.
+/// Frames used to find the target and the scale; more would not improve them.
 pub(super) const HELD_FRAMES: usize = 8;
 
-/// A frame that measures a smaller share of the target shows nothing elsewhere: it lost it.
+/// A frame that measures a smaller share of the target has lost it, and does not show it elsewhere.
 const MIN_MEASURED: f64 = 0.1;
 
 pub(super) struct Scan<'a> {
     pub(super) bench: &'a Workbench<'a>,
     /// Pixels grouped by cell, in image order inside a cell.
     pub(super) pixels: Vec<u32>,
-    /// First index into `pixels` of each cell, and the end.
+    /// First index of each cell in `pixels`, and the end.
     pub(super) starts: Vec<usize>,
     pub(super) plane: Plane,
     /// See [`words_a_step`].
     pub(super) words_a_step: f64,
-    /// Expected depth, m, pixel by pixel of `pixels`.
+    /// Expected depth of each of `pixels`, m.
     pub(super) expected: Vec<f32>,
-    /// Greatest residual kept in each cell, m, from where the cell lies in the frame.
+    /// Largest residual kept in each cell, m, relative to the cell's offset in the frame.
     pub(super) cut: Vec<f32>,
     pub(super) follow: Follow,
     pub(super) count: Vec<u32>,
@@ -40,7 +40,7 @@ pub(super) struct Scan<'a> {
     pub(super) own_planes: Vector3<f64>,
 }
 
-/// Per cell: residuals, frame by frame reduced to what the variance between frames needs.
+/// Sums of a cell's residuals over the frames, for the variance between frames.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FrameSums {
     pub n: f64,
@@ -49,7 +49,7 @@ pub(super) struct FrameSums {
 }
 
 impl<'a> Scan<'a> {
-    /// Group the target's pixels into cells and find each cell's cut from the frames held.
+    /// Groups the target's pixels into cells and finds each cell's cut from the frames held.
     pub fn begin(bench: &'a Workbench<'a>, target: &Target, held: &[Frame]) -> Self {
         let plane = target.plane;
         let (pixels, starts) = by_cell(&target.pixels, &plane, bench);
@@ -84,7 +84,8 @@ impl<'a> Scan<'a> {
         self.starts[cell]..self.starts[cell + 1]
     }
 
-    /// Robust scale of each cell: median absolute deviation, then cut and corrected to its end.
+    /// Finds each cell's cut and mean from its robust scale: the median absolute deviation, refined by
+    /// [`settled_scale`].
     fn find_cuts(&mut self, held: &[Frame]) {
         for cell in 0..self.cut.len() {
             let (range, stride) = (self.cell_range(cell), self.stride(cell));
@@ -101,14 +102,13 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Every how many pixels of a cell are enough for its cut.
+    /// Stride through a cell's pixels that leaves enough for its cut.
     fn stride(&self, cell: usize) -> usize {
         const ENOUGH: usize = 20_000;
         (self.cell_range(cell).len() * self.follow.held / ENOUGH).max(1)
     }
 
-    /// By how much each cell's residuals lie off, as a whole, in this frame; `None` where more than half of what
-    /// it measured is too far off.
+    /// Offset of each cell's residuals in this frame; `None` where more than half of them are beyond the cut.
     pub(super) fn shifts(&mut self, frame: &Frame) -> Option<Vec<f32>> {
         let (mut kept, mut measured) = (0, 0);
         let mut offsets = Vec::with_capacity(self.cut.len());
@@ -142,7 +142,7 @@ impl<'a> Scan<'a> {
         self.bench.step(self.words_a_step, w)
     }
 
-    /// A fronto-parallel plane in a coarse code may show no spread at all.
+    /// Floor of the scale, m: a fronto-parallel plane in a coarse code may show no spread.
     fn min_scale(&self, cell: usize) -> f64 {
         let z = f64::from(self.expected[self.starts[cell]]);
         0.3 * self.step(1.0 / z) * z * z
@@ -166,7 +166,7 @@ impl<'a> Scan<'a> {
         (sum / n).sqrt()
     }
 
-    /// Whether it was taken: not where most of the target is off what the first frames show.
+    /// Adds a frame, unless most of the target is elsewhere than in the first frames. Returns whether it did.
     pub fn add(&mut self, frame: &Frame) -> bool {
         let Some(shifts) = self.shifts(frame) else { return false };
         match self.bench.options.planes {
@@ -226,7 +226,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Least squares of this frame alone, on the residuals inside the cut, in inverse depth.
+    /// Plane of this frame alone: least squares in inverse depth on the residuals within the cut.
     fn own_plane(&self, frame: &Frame, shifts: &[f32]) -> Option<Plane> {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
@@ -247,10 +247,10 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// Half squared differences of a pixel's residual over one and two frames, over the first frames.
+/// Mean half squared differences of a pixel's residual over one and two frames, in the first frames.
 ///
-/// They estimate variance times 1 - rho(lag) without knowing the pixel's own mean, and for a
-/// first-order filter rho(2) = rho(1)^2, so that their ratio is 1 + rho(1).
+/// They estimate the variance times 1 - rho(lag) without the pixel's own mean. For a first-order filter
+/// rho(2) = rho(1)^2, so their ratio is 1 + rho(1).
 #[derive(Debug, Default)]
 pub(super) struct Lagged {
     pub frames: usize,

@@ -1,5 +1,4 @@
-//! Tables of sigma: what a model is fitted to; as text, measurements.csv and what somebody else
-//! measured.
+//! Tables of sigma, to which models are fitted; writes measurements.csv and reads tables of any source.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,10 +11,10 @@ use crate::read::read_bytes;
 use crate::stats::Budget;
 use crate::units::shortest;
 
-/// Which standard deviation a model is fitted to.
+/// The standard deviation that a model is fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SigmaKind {
-    /// Over the pixels of one frame, along the optical axis: the default.
+    /// Over the pixels of one frame, along the optical axis (the default).
     #[default]
     Spatial,
     /// Of one pixel over time.
@@ -27,7 +26,7 @@ pub enum SigmaKind {
 }
 
 impl SigmaKind {
-    /// For messages and provenance.
+    /// Name for messages and provenance.
     pub fn description(self) -> &'static str {
         match self {
             SigmaKind::Spatial => "spatial sigma of one frame, along the optical axis",
@@ -44,9 +43,9 @@ pub struct SigmaRow {
     pub z_m: f64,
     pub theta_rad: f64,
     pub sigma_m: f64,
-    /// Independent samples behind it; `None` when the table does not say.
+    /// Effective number of independent samples; `None` when the table does not give it.
     pub n_effective: Option<f64>,
-    /// Rows of one view share the view's errors.
+    /// Index of the view; its rows share errors.
     pub view: usize,
 }
 
@@ -57,7 +56,7 @@ impl SigmaRow {
     }
 }
 
-/// What a model is fitted to.
+/// The data that a model is fitted to.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SigmaTable {
     pub rows: Vec<SigmaRow>,
@@ -103,10 +102,10 @@ fn rows_of(view: usize, m: &ViewMeasurement, kind: SigmaKind) -> Vec<SigmaRow> {
     m.cells.iter().filter_map(row).collect()
 }
 
-/// A column of measurements.csv: its name, and what it says of a cell of a view.
+/// A column of measurements.csv: its name, and its value for a cell of a view.
 type Column = (&'static str, fn(&ViewMeasurement, &Cell) -> String);
 
-/// Programs go by the names (`crate::docs::layouts`).
+/// Programs rely on the names (`crate::docs::layouts`).
 const COLUMNS: [Column; 30] = [
     ("view", |m, _| m.name.clone()),
     ("z_m", |_, cell| number(cell.z_m)),
@@ -140,7 +139,7 @@ const COLUMNS: [Column; 30] = [
     ("distance_error_expanded_m", |m, _| of_budget(m, |b| Some(b.expanded_m))),
 ];
 
-/// measurements.csv: a row a cell, SI units, empty where a statistic cannot be had.
+/// Text of measurements.csv: one row per cell, in SI units, empty where a statistic is not available.
 pub fn write_measurements(views: &[ViewMeasurement]) -> String {
     // Writing to memory does not fail.
     let mut table = ::csv::Writer::from_writer(Vec::new());
@@ -151,7 +150,7 @@ pub fn write_measurements(views: &[ViewMeasurement]) -> String {
     String::from_utf8(table.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
-/// Shortest text that reads back to the same number; empty for what is not one.
+/// Shortest text that parses back to the same number; empty where it is not finite.
 fn number(v: f64) -> String {
     if v.is_finite() { shortest(v) } else { String::new() }
 }
@@ -166,9 +165,9 @@ fn of_budget(m: &ViewMeasurement, of: impl Fn(&Budget) -> Option<f64>) -> String
 
 const REMEDY_TABLE: &str = "the header is z_m,theta_rad,sigma_m and optionally n, SI units";
 
-/// Read `z_m,theta_rad,sigma_m[,n]` (any order, other columns ignored). With a column `view`
-/// rows of the same name count as one view; a column `n_effective` is preferred to `n`.
-/// An error when a column is missing or a value is not a usable number; the message names the line.
+/// Reads `z_m,theta_rad,sigma_m[,n]` (in any order, other columns ignored). With a column `view`, rows of
+/// the same name count as one view; a column `n_effective` is preferred to `n`.
+/// Fails when a column is missing or a value is not a usable number; the message names the line.
 pub fn read_table(path: &Path) -> Result<SigmaTable> {
     let text = read_bytes(path)?;
     let wrong = |line: usize, what: String| Error::text(path, line, what, REMEDY_TABLE);

@@ -1,4 +1,4 @@
-//! One view: its frames are read once, in order, and only a handful are held.
+//! Measures one view: its frames are read once, in order, and only a few are kept in memory.
 
 use rayon::prelude::*;
 
@@ -12,7 +12,7 @@ use crate::io::InfraredImage;
 use crate::plane::{Points, RansacOptions, RansacPlane, Target, ransac_plane};
 use crate::view::{Excluded, Recording, View, take_out_copies};
 
-/// An error when no frame can be read or none shows a plane; others that cannot are notes.
+/// Measures a view. Fails when no frame can be read or none shows a plane; single bad frames become notes.
 pub fn measure_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMeasurement> {
     let mut reader = FrameReader::of(view, bench);
     let (numbers, held) = reader.hold(view)?;
@@ -69,10 +69,10 @@ fn stray_note(view: &View, strays: &[usize]) -> Option<String> {
     ))
 }
 
-/// So many views are no chance: one in 32 where either reading alike finds a plane that the other does not.
+/// Fewest views for the remark: a chance of one in 32 if either reading alone were as likely to find a plane.
 const MIN_RANGES: usize = 5;
 
-/// What to say where excluded views hold a plane once their raw values are taken for ranges, and none as depths.
+/// Remark for excluded views that show a plane when their raw values are taken as ranges, but not as depths.
 pub fn ranges_remark(
     recording: &Recording,
     excluded: &[Excluded],
@@ -95,7 +95,7 @@ pub fn ranges_remark(
     })
 }
 
-/// Drops views of the same region in the same frames as a view before, and tells which.
+/// Removes views with the same region and frames as an earlier view, and returns them as excluded.
 pub fn without_copies(recording: &Recording, views: &mut Vec<ViewMeasurement>) -> Vec<Excluded> {
     let region = |name: &str| {
         recording.views.iter().find(|v| v.name == name).and_then(|v| v.notes.region.as_ref())
@@ -130,14 +130,14 @@ fn infrared_of(
     None
 }
 
-/// In robust standard deviations; the paper does not print its threshold.
+/// RANSAC threshold in robust standard deviations; the paper does not give its own.
 const THRESHOLD_SIGMAS: f64 = 3.0;
 const MIN_THRESHOLD_M: f64 = 0.001;
 const CONFIDENCE: f64 = 0.999;
 
-/// The paper's own measurement (Yamaguchi et al. 2016, section II), on a view's first frame: RANSAC.
-/// Its sigma is low by the cut of the tails (1.3 % at three standard deviations) and is measured
-/// across the plane: cos(theta) times the axial one for noise along the axis.
+/// The paper's own measurement (Yamaguchi et al. 2016, section II): RANSAC on a view's first frame.
+/// Its sigma is low by the cut of the tails (1.3 % at three standard deviations) and is perpendicular to
+/// the plane: cos(theta) times the axial sigma for noise along the axis.
 fn by_the_paper(
     view: &View,
     bench: &Workbench<'_>,

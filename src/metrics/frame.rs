@@ -1,28 +1,28 @@
-//! One frame, as RealSense's Depth Quality Tool looks at it: a plane by least squares along the axis
-//! that suits it best, and what the pixels are off it.
+//! Metrics of one frame as in RealSense's Depth Quality Tool: a least-squares plane along the
+//! best-conditioned axis, and the pixels' deviations from it.
 //!
-//! The formulas are its readme's (librealsense, tools/depth-quality/readme.md), the order of the steps
-//! its program's (depth-metrics.h, rs-depth-quality.cpp). In double precision; the tool's is single.
+//! The formulas are from its readme (librealsense, tools/depth-quality/readme.md), the order of the steps
+//! from its program (depth-metrics.h, rs-depth-quality.cpp). All in double precision; the tool uses single.
 
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// What the tool shows of one frame. Shares are of one, not percent.
+/// What the tool shows for one frame. Shares are fractions, not percent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameMetrics {
     /// Share of the region's pixels that have a depth.
     pub fill_rate: f64,
-    /// Of the camera from the fitted plane, m.
+    /// Distance of the camera from the fitted plane, m.
     pub distance_m: f64,
     /// Depth at which the optical axis meets the plane, m.
     pub axis_distance_m: f64,
-    /// Between the optical axis and the plane's normal, rad.
+    /// Angle between the optical axis and the plane's normal, rad.
     pub tilt_rad: f64,
     /// Root mean square of the pixels' distances from the plane, m: "spatial noise".
     pub plane_fit_rms_m: f64,
-    /// The same as a share of the distance.
+    /// RMS relative to the distance.
     pub plane_fit_rms: f64,
-    /// Root mean square of the disparities' errors, px; without a baseline none.
+    /// RMS of the disparity errors, px; `None` without a baseline.
     pub subpixel_rms_px: Option<f64>,
     /// Median signed error against the reference distance, as a share of it.
     pub z_accuracy: Option<f64>,
@@ -31,14 +31,14 @@ pub struct FrameMetrics {
 /// The tool leaves out one in this many pixels at each end of the depths.
 const LEFT_OUT: usize = 200;
 
-/// A plane n . X + d = 0, n of length one.
+/// A plane n . X + d = 0 with unit normal n.
 struct Fit {
     n: Vector3<f64>,
     d: f64,
 }
 
 impl FrameMetrics {
-    /// Of the measured `points` (m) of a region of so many pixels; `None` where they span no plane.
+    /// Metrics of the measured `points` (m) of a region of `pixels` pixels; `None` if they span no plane.
     pub fn of(
         mut points: Vec<Vector3<f64>>,
         pixels: usize,
@@ -78,7 +78,7 @@ impl FrameMetrics {
         })
     }
 
-    /// The mean of each figure over those that have it; `None` for no frame.
+    /// Mean of each metric over the frames that have it; `None` for no frames.
     pub fn mean(frames: &[FrameMetrics]) -> Option<Self> {
         let count = frames.len() as f64;
         let of = |value: fn(&FrameMetrics) -> f64| frames.iter().map(value).sum::<f64>() / count;
@@ -100,7 +100,7 @@ impl FrameMetrics {
 }
 
 impl Fit {
-    /// Least squares along the axis for which the other two span the most.
+    /// Least squares along the axis whose two others span the most.
     fn of(points: &[Vector3<f64>]) -> Option<Self> {
         if points.len() < 3 {
             return None;
@@ -128,7 +128,7 @@ impl Fit {
         } else {
             Vector3::new((yz * xy - xz * yy) / z, (xz * xy - yz * xx) / z, 1.0)
         };
-        // Away from the camera, so that what is farther than the plane is off by a positive distance.
+        // Pointing away from the camera, so that points behind the plane have positive distances.
         let n = direction.normalize();
         let n = if n.dot(&centroid) < 0.0 { -n } else { n };
         Some(Fit { n, d: -n.dot(&centroid) })
@@ -151,7 +151,7 @@ mod tests {
         assert!((flat.z_accuracy.unwrap() - 0.02 / 1.98).abs() < 1e-12);
         points[210].z += 0.004;
         let bumped = FrameMetrics::of(points, 500, None, None).unwrap();
-        // One of 396 that are kept is off.
+        // One of the 396 kept points is off.
         let expected = 0.004 / 396f64.sqrt() / 1.01f64.sqrt();
         assert!((bumped.plane_fit_rms_m / expected - 1.0).abs() < 0.01);
         assert_eq!((bumped.subpixel_rms_px, bumped.z_accuracy), (None, None));

@@ -1,11 +1,11 @@
-//! The figures that vendors of depth cameras give, by the formulas of RealSense's Depth Quality Tool.
+//! The metrics of depth camera vendors, by the formulas of RealSense's Depth Quality Tool.
 //!
-//! They differ from what [`crate::measure`] finds on the same pixels. The tool's plane is fitted to all
-//! points of a frame, gross errors and bent corners with them; it then leaves out the half percent of
-//! nearest and farthest points, which on a tilted target are its ends and not its errors; its root mean
-//! square is across the plane, and holds whatever bends the depth; its temporal noise is a share of the
-//! depth and counts a rounded pixel that never changes as one without noise. kinoise's sigma is robust,
-//! along the optical axis, and with a standard error.
+//! They differ from what [`crate::measure`] finds on the same pixels. The tool fits its plane to all points
+//! of a frame, including gross errors and bent corners. It then leaves out the half percent of nearest and of
+//! farthest points, which on a tilted target are its ends and not its errors. Its RMS is perpendicular to the
+//! plane and includes everything that bends the depth. Its temporal noise is a share of the depth, and a
+//! pixel whose rounded depth never changes counts as noise-free. kinoise's sigma is robust, along the optical
+//! axis, and has a standard error.
 
 mod frame;
 mod temporal;
@@ -24,7 +24,7 @@ use crate::rng::Seed;
 use crate::view::{Excluded, Recording, View};
 use temporal::TemporalNoise;
 
-/// The figures of one view.
+/// Metrics of one view.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ViewMetrics {
     pub view: String,
@@ -32,44 +32,45 @@ pub struct ViewMetrics {
     #[serde(flatten)]
     pub mean: FrameMetrics,
     pub reference_distance_m: Option<f64>,
-    /// Median over the pixels of a depth's standard deviation over its median; of one frame none.
+    /// Median over the pixels of a depth's standard deviation over its median; `None` for a single frame.
     pub temporal_noise: Option<f64>,
-    /// kinoise's own sigma of depth, m, and that of one pixel over the frames.
+    /// kinoise's own sigma of the depth, m, and that of one pixel over the frames.
     pub sigma_m: f64,
     pub sigma_temporal_m: Option<f64>,
     pub frames: Vec<FrameMetrics>,
 }
 
-/// Views at about one distance together: those that face the sensor, where there are any.
+/// Views at about one distance, combined; only frontal views if the recording has any.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AtDistance {
-    /// From, to; m.
+    /// Lower and upper end, m.
     pub range_m: [f64; 2],
     pub views: usize,
-    /// Means over the views that have the figure.
+    /// Means over the views that have the metric.
     #[serde(flatten)]
     pub mean: FrameMetrics,
     pub temporal_noise: Option<f64>,
 }
 
-/// The figures of a recording.
+/// Metrics of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Metrics {
     pub views: Vec<ViewMetrics>,
     pub by_distance: Vec<AtDistance>,
-    /// Views that cannot be used: the name, and why.
+    /// Views that cannot be used: name and reason.
     pub excluded: Vec<[String; 2]>,
 }
 
-/// The tool asks for a target that is faced; by hand that is within ten degrees.
+/// Largest tilt of a frontal view; the tool asks for a frontal target, which held by hand is within ten
+/// degrees.
 const FACED_DEG: f64 = 10.0;
-/// Distances are told by steps of so many metres.
+/// Width of the distance groups, m.
 const STEP_M: f64 = 0.5;
 
-/// The figures of every view, each over its target's pixels.
+/// Computes the metrics of every view, each over its target's pixels.
 ///
 /// # Errors
-/// When no view can be used; the message gives the first reason.
+/// If no view can be used; the message gives the first reason.
 pub fn metrics(recording: &Recording, seed: Seed, progress: Progress<'_>) -> Result<Metrics> {
     let options = MeasureOptions { seed, ..MeasureOptions::default() };
     let bench = Workbench::new(&recording.sensor, options);
@@ -102,7 +103,7 @@ fn of_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMetrics> {
     let mut over_time = TemporalNoise::of(target.pixels.len());
     let mut frames = Vec::new();
     for stored in &view.depth {
-        // What cannot be read is a note of the calibration, and no frame here.
+        // An unreadable frame is remarked by the calibration; here it is skipped.
         let Ok(frame) = source.frame(stored) else { continue };
         let code = &bench.sensor.code;
         let raw = target.pixels.iter().map(|&i| frame.raw[i as usize]);

@@ -1,16 +1,16 @@
-//! Temporal noise as the Depth Quality Tool has it (`calculate_temporal_noise`): of each pixel the
-//! standard deviation of its measured depths over their median; of all pixels, the median.
+//! Temporal noise as defined by the Depth Quality Tool (`calculate_temporal_noise`): the median over the
+//! pixels of the standard deviation of a pixel's depths over their median.
 
 use crate::frame::DepthCode;
 use crate::stats::median;
 
-/// The raw values of some pixels over a view's frames.
+/// The raw values of a set of pixels over a view's frames.
 pub(super) struct TemporalNoise {
     measured: Vec<Vec<u16>>,
     frames: usize,
 }
 
-/// Frames that are kept: ten times what a vendor takes, and a view's memory stays below 100 MB.
+/// Most frames kept: ten times what a vendor takes; a view's memory stays below 100 MB.
 const MAX_FRAMES: usize = 100;
 
 impl TemporalNoise {
@@ -18,7 +18,7 @@ impl TemporalNoise {
         TemporalNoise { measured: vec![Vec::new(); pixels], frames: 0 }
     }
 
-    /// A frame's raw values, `None` where there is no depth.
+    /// Adds a frame's raw values, `None` where there is no depth.
     pub fn add(&mut self, raw: impl Iterator<Item = Option<u16>>) {
         if self.frames < MAX_FRAMES {
             self.frames += 1;
@@ -26,7 +26,8 @@ impl TemporalNoise {
         }
     }
 
-    /// A share of the depth; `None` with a single frame. Pixels that were never measured have none.
+    /// The noise as a share of the depth; `None` for a single frame. Pixels that were never measured are
+    /// skipped.
     pub fn median_share(&self, code: &DepthCode) -> Option<f64> {
         let depths = |raw: &Vec<u16>| raw.iter().filter_map(|&r| code.metres(r)).collect();
         let measured = self.measured.iter().filter(|raw| !raw.is_empty());

@@ -1,4 +1,4 @@
-//! How sure a fitted shape is, and together with which others.
+//! Covariance of a fitted shape, also with the other shapes of the same fit.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,14 +22,14 @@ impl Covariance {
         self.factors.is_empty() && self.variances.is_empty()
     }
 
-    /// To four digits, which is more than it is known to.
+    /// Rounds to four digits, more than are significant.
     pub fn rounded(mut self) -> Self {
         let all = self.factors.iter_mut().flatten().chain(&mut self.variances);
         all.for_each(|x| *x = four_digits(*x));
         self
     }
 
-    /// With another shape's of the same fit behind it.
+    /// Appends the covariance of another shape of the same fit.
     pub fn extend(&mut self, other: Covariance) {
         for (mine, theirs) in self.factors.iter_mut().zip(other.factors) {
             mine.extend(theirs);
@@ -37,7 +37,7 @@ impl Covariance {
         self.variances.extend(other.variances);
     }
 
-    /// What is wrong with it, if anything, for a shape of so many coefficients.
+    /// What is wrong with it, if anything, for a shape of this many coefficients.
     pub fn fault(&self, coefficients: usize) -> Option<&'static str> {
         let whole = |v: &Vec<f64>| v.len() == coefficients && v.iter().all(|x| x.is_finite());
         if !self.factors.iter().all(whole) {

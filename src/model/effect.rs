@@ -1,4 +1,4 @@
-//! What a model holds beyond sigma: physical effects, with the free shape that was fitted.
+//! Physical effects of a model beyond sigma, with the free shapes fitted to them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,16 +30,16 @@ pub struct Effect {
     pub between_views: Vec<f64>,
 }
 
-/// The id of what has no name: its shape is all that is known.
+/// Id of an effect without a name, of which only the shape is known.
 pub const UNEXPLAINED: &str = "unexplained";
 
-/// No disparity is larger than an image is wide.
+/// Largest disparity, px: none exceeds the width of an image.
 const MAX_PX: f64 = 65_536.0;
-/// Of a term's size, from view to view, as a share of it.
+/// Largest scatter of a term's size between views, as a share of it.
 const MAX_SCATTER: f64 = 1e3;
 
 impl Effect {
-    /// The number of a parameter, which is a number or {"value": number, ..}.
+    /// Value of a parameter, which is a number or {"value": number, ..}.
     pub fn number(&self, name: &str) -> Option<f64> {
         let parameter = self.parameters.get(name)?;
         parameter.get("value").unwrap_or(parameter).as_f64()
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
     use crate::terms::{Basis, Coordinate, Modulation, Statistic, TABLE};
 
-    /// One of each kind.
+    /// One basis of each kind.
     fn bases() -> Vec<Basis> {
         let (over, times) = (Coordinate::Session, Modulation::Tilt);
         let (low, high) = (-1e6, 1.0 / 3.0);
@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(serde_json::from_str::<Effect>(&text).unwrap(), effect);
     }
 
-    /// Of an older file, of this one, and what makes no sense.
+    /// As in an older file, as in a current one, and invalid ones.
     #[test]
     fn the_scatter_between_views_is_a_share_a_term() {
         let of = |between_views| {
@@ -158,7 +158,7 @@ mod tests {
         assert_eq!(serde_json::from_str::<Effect>(&text).unwrap(), of(vec![]));
     }
 
-    /// A coefficient too many or too few, or one that is no number, is a fault.
+    /// A coefficient too many or too few, a NaN, or a wrong statistic is a fault.
     #[test]
     fn a_wrong_shape_is_refused() {
         let lies: [fn(&mut Term); 4] = [

@@ -1,4 +1,4 @@
-//! What is wrong with numbers that claim to be a model.
+//! Checks that the numbers of a model are valid.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -7,16 +7,16 @@ use crate::frame::FARTHEST_M;
 use crate::read::MAX_NUMBER;
 use crate::stats::even;
 
-/// Points a side at which sigma is looked at between the domain's corners. What the forms can do
-/// in between (a parabola's vertex is looked at by itself) is smooth on this scale.
+/// Points per side at which sigma is checked over the domain. The forms are smooth on this scale, except
+/// for a parabola's vertex, which is checked by itself.
 const GRID: usize = 33;
 
-/// Rounding of a correlation matrix: its entries are good to about 1e-16 times the condition
+/// Tolerance for rounding of a correlation matrix: its entries are good to about 1e-16 times the condition
 /// number of the fit, which `statistics::UNSEEN` bounds well below what this allows.
 const ROUNDING: f64 = 1e-8;
 
 impl SigmaModel {
-    /// What is wrong with these numbers as a model, if anything: shape, domain, certainty, and
+    /// What is wrong with these numbers as a model, if anything: shape, domain, uncertainty, and
     /// sigma itself, which must be finite and positive on the whole domain.
     pub fn fault(&self) -> Option<String> {
         self.wrong_shape()
@@ -36,7 +36,7 @@ impl SigmaModel {
                 self.form
             ));
         }
-        // What is written must be read again.
+        // What is written must be readable again.
         let mut numbers = self.parameters.iter().chain(self.covariance.iter());
         let measured = numbers.all(|v| v.abs() <= MAX_NUMBER);
         (!measured).then(|| {
@@ -100,8 +100,8 @@ impl SigmaModel {
     }
 }
 
-/// Symmetric, and no combination of parameters has a negative variance, within rounding. Judged
-/// on the correlations: the parameters' own units differ by many orders of magnitude.
+/// Whether the matrix is symmetric and positive semi-definite, within rounding. Judged on the correlations,
+/// because the scales of the parameters differ by many orders of magnitude.
 fn is_covariance(covariance: &DMatrix<f64>) -> bool {
     let p = covariance.nrows();
     let root: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
@@ -109,7 +109,7 @@ fn is_covariance(covariance: &DMatrix<f64>) -> bool {
         return false;
     }
     let correlation = DMatrix::from_fn(p, p, |i, j| match covariance[(i, j)] {
-        // A held parameter has no variance and may share none.
+        // A held parameter has neither variance nor covariance.
         0.0 => 0.0,
         c => c / root[i] / root[j],
     });

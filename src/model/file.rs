@@ -1,4 +1,4 @@
-//! `model.json` (`crate::docs::layouts`): written and read back bit for bit, refused when foreign.
+//! `model.json` (`crate::docs::layouts`): written and read back bit for bit; foreign files are refused.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use crate::view::{RecordingFile, Sensor};
 
 /// The format this version writes and reads.
 pub const MODEL_FORMAT: &str = "kinoise-model/1";
-/// The name that every command gives it.
+/// The file name that every command uses.
 const MODEL: &str = "model.json";
 const FORMAT_FAMILY: &str = "kinoise-model/";
 
@@ -31,7 +31,7 @@ pub struct NoiseModel {
     pub sensor: Option<RecordingFile>,
     pub sigma: SigmaModel,
     pub effects: Vec<Effect>,
-    /// Budgets of what was measured, where the recording states uncertainties.
+    /// Budgets of the measured values, where the recording states uncertainties.
     pub uncertainty: Option<Uncertainty>,
     pub fit: FitSummary,
     pub provenance: Provenance,
@@ -80,7 +80,7 @@ const REMEDY: &str = "make the model again with `kinoise calibrate` or `kinoise 
 const REMEDY_EFFECT: &str = "make the model again with `kinoise diagnose`, or take the effect out";
 
 impl NoiseModel {
-    /// The paper's Eq. 1, and nothing beyond sigma.
+    /// The paper's Eq. 1 without effects.
     pub fn paper() -> Self {
         NoiseModel {
             sensor: None,
@@ -92,8 +92,8 @@ impl NoiseModel {
         }
     }
 
-    /// The sensor that it was made of; nothing for a model of a bare table.
-    /// An error when its description contradicts itself.
+    /// The sensor that the model was made of; `None` for a model of a bare table.
+    /// Fails when its description contradicts itself.
     pub fn described_sensor(&self) -> Result<Option<Sensor>> {
         self.sensor.clone().map(RecordingFile::sensor).transpose().map_err(|what| Error::Argument {
             what: format!("the model's sensor: {what}"),
@@ -101,7 +101,7 @@ impl NoiseModel {
         })
     }
 
-    /// The text of `model.json`; an error when a number of the model is not finite.
+    /// The text of `model.json`. Fails when a number of the model is not finite.
     pub fn to_json(&self) -> Result<String> {
         let of_effects = || self.effects.iter().find_map(Effect::fault);
         if let Some(what) = self.sigma.fault().or_else(of_effects) {
@@ -144,12 +144,12 @@ impl NoiseModel {
         write_atomic(path, self.to_json()?.as_bytes())
     }
 
-    /// The `model.json` that is meant: a folder stands for the one in it.
+    /// Path of the `model.json`: for a folder, the one in it.
     pub fn file(path: &Path) -> PathBuf {
         if path.is_dir() { path.join(MODEL) } else { path.to_path_buf() }
     }
 
-    /// What a `model.json` says, its effects not yet held against the catalogue.
+    /// Reads a `model.json`, without checking its effects against the catalogue.
     pub(crate) fn read_unchecked(file: &Path) -> Result<Self> {
         let text = read_json(file)?;
         let path = file.to_path_buf();
@@ -164,7 +164,7 @@ impl NoiseModel {
         if let Some(what) = absurd(&value) {
             return Err((what, REMEDY));
         }
-        // From the text, for its lines.
+        // From the text, so that errors have line numbers.
         let file: ModelFile = serde_json::from_str(text).map_err(|e| {
             let (line, why) = (e.line(), plainly(&e));
             (format!("line {line}: a part of the model is missing or wrong ({why})"), REMEDY)
@@ -246,7 +246,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Any finite doubles survive the file exactly.
+        /// Finite `f64`s survive the file exactly.
         #[test]
         fn numbers_read_back_bit_for_bit(a in 1e-12f64..1.0, b in 1e-300f64..1.0, c in -1.0f64..1.0, s in 1e-300f64..1e30) {
             let mut model = NoiseModel::paper();

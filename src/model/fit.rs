@@ -1,9 +1,8 @@
-//! Fitting a form of sigma(z, theta) to a table.
+//! Fits a form of sigma(z, theta) to a table.
 //!
 //! Residuals are relative to the model, (s_i - sigma_i)/sigma_i, and the weights follow the
 //! model, so the estimate solves sum_i J_i' C^-1 (s_i - sigma_i) = 0 (quasi-likelihood with
-//! constant coefficient of variation). The start comes from the data alone, so there is no
-//! "start" to get wrong.
+//! constant coefficient of variation). The start comes from the data alone; the user gives none.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,14 +15,14 @@ use crate::measure::{SigmaRow, SigmaTable};
 use crate::solve::{LeastSquares, trust_region};
 use crate::units::{counted, verb};
 
-/// Distances closer than this count as one.
+/// Distances within this ratio count as one.
 pub const DISTANCE_RATIO: f64 = 1.05;
 const MAX_ROUNDS: usize = 60;
-/// Largest change of ln sigma over the table at which the weights have settled.
+/// Largest change of ln sigma over the table at which the weights have converged.
 const SETTLED: f64 = 1e-10;
 
-/// Fit `form` to every row of `table`; an error when it has too few rows or distances for the form,
-/// or the solver finds no surface that is positive over their range.
+/// Fits `form` to every row of `table`. Fails when it has too few rows or distances for the form, or the
+/// solver finds no surface that is positive over their range.
 pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     let spec = form.spec();
     let mut rows = Rows::new(table);
@@ -59,22 +58,22 @@ pub fn fit_all(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     Ok(report(form, &rows, p, &free, remarks, rounds, converged))
 }
 
-/// A fit under way.
+/// A fit in progress.
 struct Fit<'a> {
     rows: Rows,
     spec: &'a dyn SigmaForm,
     p: Vec<f64>,
-    /// Parameters that are not held.
+    /// Indices of the parameters that are not held.
     free: Vec<usize>,
     remarks: Vec<String>,
 }
 
-/// A surface may not come nearer to zero inside its range than this share of the least sigma
-/// measured: between two distances a parabola can dip to where no sensor is.
+/// Floor of a surface inside its range, as a share of the least measured sigma: between two distances a
+/// parabola can dip lower than any sensor's noise.
 const MIN_SHARE: f64 = 0.1;
 
 impl Fit<'_> {
-    /// Weigh by the surface and fit again; the largest change of ln sigma over the table.
+    /// Weights by the surface and fits again; returns the largest change of ln sigma over the table.
     fn round(&mut self) -> f64 {
         let Fit { rows, spec, p, free, .. } = self;
         rows.refer_to(|r| positive(spec.sigma(p, r.z_m, r.theta_rad), r.sigma_m));
@@ -86,7 +85,7 @@ impl Fit<'_> {
         self.rows.iter().zip(self.rows.reference()).map(change).fold(0.0, f64::max)
     }
 
-    /// Hold free parameters that left where they can be believed at the edge.
+    /// Holds free parameters that left their plausible range at its edge.
     fn hold_strays(&mut self) {
         let Fit { rows, spec, p, free, remarks } = self;
         free.retain(|&i| match spec.limits(i, rows) {
@@ -103,21 +102,21 @@ impl Fit<'_> {
         });
     }
 
-    /// Where the surface is least inside its range: at the vertex or the end of z next to it, and
-    /// at the least tilt, for no form's tilt term is negative.
+    /// Where the surface is least inside its range: at the vertex or the end of z next to it, and at the
+    /// least tilt, because no form's tilt term is negative.
     fn min_point(&self) -> Option<(f64, f64)> {
         let domain = Domain::of(&self.rows, self.spec.pole(&self.p));
         self.spec.vertex(&self.p).map(|c| domain.clamp(c, 0.0))
     }
 
-    /// Lift a surface that dips too low to [`MIN_SHARE`] and hold its floor there. True when that
-    /// was needed: the rest must be fitted again.
+    /// Lifts a surface that dips below the floor ([`MIN_SHARE`]) and holds its first parameter. Returns
+    /// whether it did: the others must then be fitted again.
     fn hold_positive(&mut self) -> bool {
         let Some((z, theta)) = self.min_point() else { return false };
         let floor = MIN_SHARE * self.rows.range(|r| r.sigma_m)[0];
         let sigma = self.spec.sigma(&self.p, z, theta);
         let is_free = self.free.contains(&0);
-        // Once lifted, half the way down again is let be: the surface is positive.
+        // Once lifted, a dip to half the floor is accepted: the surface is still positive.
         if sigma >= if is_free { floor } else { 0.5 * floor } {
             return false;
         }
@@ -175,13 +174,13 @@ fn enough(rows: &Rows, spec: &dyn SigmaForm) -> Result<()> {
     Ok(())
 }
 
-/// The local problem: fixed weights, scaled working coordinates of the free parameters.
+/// The local problem: fixed weights, and scaled working coordinates of the free parameters.
 struct Local<'a> {
     rows: &'a Rows,
     spec: &'a dyn SigmaForm,
     base: &'a [f64],
     free: &'a [usize],
-    /// Working coordinate = scale * (walked parameter): columns of J then have unit length.
+    /// Working coordinate = scale * (transformed parameter), so that columns of J have unit length.
     scale: Vec<f64>,
     target: DVector<f64>,
 }
@@ -216,7 +215,7 @@ impl Local<'_> {
         p
     }
 
-    /// d(parameter)/d(working coordinate), without the scale.
+    /// Derivative of the parameter by the working coordinate, without the scale.
     fn slope(&self, p: &[f64], i: usize) -> f64 {
         match self.walk(i) {
             Walk::Linear => 1.0,

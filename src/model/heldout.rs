@@ -1,29 +1,29 @@
-//! Judging forms on distances they have not seen.
+//! Judges forms on held-out distances.
 
 use super::fit::{DISTANCE_RATIO, fit_all};
 use super::forms::Form;
 use super::rows::Rows;
 use crate::measure::SigmaTable;
 
-/// How a form predicts the sigmas of a distance left out of its fit, over all distances.
+/// Prediction quality of a form at distances left out of its fit, over all distances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut {
     pub form: Form,
-    /// Mean log density of the relative residual, nats a view; greater is better.
+    /// Mean log density of the relative residual, nats per view; greater is better.
     pub log_score: f64,
-    /// Root mean square relative error, views weighing the same.
+    /// Root mean square relative error, with equal weights for all views.
     pub rmse_relative: f64,
-    /// Mean squared error in its own predicted variance; one where the form knows how sure it is.
+    /// Mean squared error over the predicted variance; one where the form's uncertainty is right.
     pub chi2: f64,
-    /// Groups of distances that were left out in turn.
+    /// Number of groups of distances left out in turn.
     pub folds: usize,
 }
 
-/// More distances than this are put together into as many groups.
+/// More distances than this are merged into as many groups.
 const MAX_FOLDS: usize = 8;
 
-/// Leave out one distance (or group of neighbouring distances) at a time; views stay whole. Every
-/// row counts: take outliers out first ([`super::sort_out`]), so that all forms are asked the same.
+/// Leaves out one distance (or group of neighbouring distances) at a time; views stay whole. Every row
+/// counts, so remove outliers first ([`super::sort_out`]) for a fair comparison of forms.
 ///
 /// `None` when there are fewer than three distances or a fold cannot be fitted.
 pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
@@ -60,8 +60,7 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
                     fitted.relative_variance()
                 }
                 .max(f64::MIN_POSITIVE)
-                    // A surface that is unsure of a distance it has not seen may not be scored
-                    // as if it were sure.
+                    // The surface's own uncertainty at a distance it has not seen counts too.
                     + (surface.std_error(r.z_m, r.theta_rad) / predicted).powi(2);
                 s += -0.5
                     * (error * error / variance + (2.0 * std::f64::consts::PI * variance).ln());
@@ -85,7 +84,7 @@ pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
     (result.log_score.is_finite() && result.rmse_relative.is_finite()).then_some(result)
 }
 
-/// All forms that can be judged, best first, on the same rows for all.
+/// Scores of all forms that can be judged, best first, on the same rows.
 pub fn compare_forms(table: &SigmaTable) -> Vec<HeldOut> {
     let mut scores: Vec<HeldOut> =
         Form::ALL.into_iter().filter_map(|f| held_out(table, f)).collect();
@@ -93,7 +92,7 @@ pub fn compare_forms(table: &SigmaTable) -> Vec<HeldOut> {
     scores
 }
 
-/// Each view with the number of its fold, by its mean distance.
+/// Each view with its fold, by mean distance.
 fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
     let mut views: Vec<(usize, f64)> = table
         .views()

@@ -1,4 +1,4 @@
-//! The noise model: sigma(z, theta) with its domain and certainty, and the file it lives in.
+//! The noise model: sigma(z, theta) with its domain and uncertainty, and its file.
 
 mod covariance;
 mod effect;

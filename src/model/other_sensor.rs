@@ -1,4 +1,4 @@
-//! Whether a model was made of the sensor that it is used on.
+//! Checks whether a model was made of the sensor that it is used on.
 
 use super::file::NoiseModel;
 use super::surface::SigmaModel;
@@ -7,14 +7,13 @@ use crate::frame::DepthCode;
 use crate::units::shortest;
 use crate::view::Sensor;
 
-/// Baselines or focal lengths this far apart are not the same sensor's.
+/// Relative difference above which baselines or focal lengths are not the same sensor's.
 const SAME_SENSOR: f64 = 0.01;
-/// Rounding that changes sigma by less is within what any calibration knows.
+/// Relative change of sigma by rounding that is within the uncertainty of any calibration.
 const SAME_SIGMA: f64 = 0.05;
 
 impl NoiseModel {
-    /// Where a sensor errs is counted in its pixels.
-    /// An error when the model is of a sensor of another resolution.
+    /// Fails when the model is of a sensor of another resolution: errors are located by pixel.
     pub fn refuse_other_size(&self, sensor: &Sensor) -> Result<()> {
         let Some(own) = &self.sensor else { return Ok(()) };
         let [[mw, mh], [w, h]] = [&own.camera, &sensor.camera].map(|c| [c.width, c.height]);
@@ -60,15 +59,15 @@ fn differences(model: &Sensor, sensor: &Sensor, sigma: &SigmaModel) -> Vec<Strin
     differences
 }
 
-/// Sigma holds the rounding of the depth code: of another code it is another sigma.
+/// Compares the rounding of the depth codes, which is part of sigma.
 fn rounding(model: DepthCode, sensor: DepthCode, sigma: &SigmaModel) -> Option<String> {
     let [near, far] = sigma.domain.z_m;
     let z = (near * far).sqrt();
     let step_m = |code: DepthCode| code.step_inverse(z) * z * z;
-    // A rounded number errs by step^2/12.
+    // The variance of rounding is step^2/12.
     let [a, b] = [model, sensor].map(|code| step_m(code).powi(2) / 12.0);
     let change = (a - b).abs() / sigma.axial_sigma(z, 0.0).powi(2);
-    // Of the standard deviation it is half as much, to first order.
+    // The standard deviation changes by half of that, to first order.
     (change > 2.0 * SAME_SIGMA).then(|| {
         format!(
             "the model's depth is stored {} (steps of {:.1} mm at {z:.1} m), the recording's {} ({:.1} mm)",
@@ -127,7 +126,7 @@ mod tests {
             matches!(&coded[..], [one] if one.contains("steps of 12.3 mm at 2.0 m")),
             "{coded:?}"
         );
-        // Millimetres or fifths of them: either rounds by far less than sigma.
+        // Millimetres or fifths of them: both round by far less than sigma.
         let [mm, fifths] = [1000.0, 5000.0].map(|units| sensor(585.0, metric(units)));
         assert_eq!(between(&mm, &fifths), Vec::<String>::new());
     }

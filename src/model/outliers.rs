@@ -1,7 +1,7 @@
-//! Sigmas that do not belong to the surface: a bin that caught a neighbouring object, a view
-//! whose target was something else. Looked for from surfaces they cannot pull (one a form, for the
-//! stiff ones cannot follow an outlier among a few steep views); left out; the rest looked at
-//! again; and the end with the least bounded loss taken.
+//! Removes outlying sigmas, such as a bin that caught a neighbouring object or a view of another target.
+//! The search starts from robust surfaces (one per form, because the stiff ones cannot follow an outlier
+//! among a few steep views), rejects outliers and refits until nothing changes, and takes the result with
+//! the least bounded loss.
 
 use super::fit::fit_all;
 use super::forms::Form;
@@ -11,38 +11,38 @@ use crate::error::Result;
 use crate::measure::{SigmaRow, SigmaTable};
 use crate::units::verb;
 
-/// Robust standard deviations of ln(measured/fitted) beyond which a sigma is left out. Measured in
-/// tests/product/outliers.rs: of clean tables of 30 rows under 1 % lose one (the scale is a median of few
-/// and sometimes small), where n is known none of 4,000 (the scale is at least sampling's).
+/// Threshold in robust standard deviations of ln(measured/fitted). Measured in tests/product/outliers.rs:
+/// under 1 % of clean tables of 30 rows lose a row (the scale is a median of few values and sometimes
+/// small); where n is known, none of 4,000 (the scale is at least that of sampling).
 const OFF: f64 = 5.0;
-/// Chi-square of sampling alone exceeds its mean by so many of its standard deviations once in a
-/// thousand tables (normal quantile of 0.999): below, nothing needs to be looked for.
+/// Excess of chi-square over its mean, in standard deviations, that sampling alone gives once in a thousand
+/// tables (normal quantile of 0.999). Below it there is nothing to search for.
 const PLAINLY_NOISE: f64 = 3.09;
-/// More than this share is no longer a few outliers but a wrong form, and nothing is left out.
+/// A larger share of outliers means a wrong form, and nothing is left out.
 const MAX_SHARE: f64 = 0.2;
 const MAX_ROUNDS: usize = 6;
-/// With fewer rows than this beyond the parameters a median of residuals is no scale.
+/// Fewest rows beyond the parameters for a scale from the median of residuals.
 const MIN_SPARE_ROWS: f64 = 6.0;
 
-/// The forms against which outliers are judged, the most flexible first: what no form can follow
-/// is no fault of the form that is asked for.
+/// The forms against which outliers are judged, the most flexible first, so that a misfit of the requested
+/// form does not make outliers.
 const JUDGES: [Form; 4] = [Form::Paper, Form::Nguyen, Form::Disparity, Form::Khoshelham];
 
-/// A table without its outliers: what every form is fitted to and compared on.
+/// A table without its outliers, on which all forms are fitted and compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sorted {
     pub kept: SigmaTable,
     pub left_out: Vec<SigmaRow>,
-    /// A remark about the rows left out, or about too many that stand off.
+    /// A remark about the rows left out, or about too many outliers.
     pub remark: Option<String>,
-    /// The judge's own fit to the rows kept.
+    /// The judging form's fit to the rows kept.
     judged_by: Option<SigmaFit>,
 }
 
 impl Sorted {
-    /// Fit `form` to the rows kept.
-    /// An error when they are too few or stand at too few distances for the form, or the solver
-    /// finds no surface that is positive over their range.
+    /// Fits `form` to the rows kept.
+    /// Fails when they are too few or at too few distances for the form, or the solver finds no surface that
+    /// is positive over their range.
     pub fn fit(&self, form: Form) -> Result<SigmaFit> {
         let mut fitted = match &self.judged_by {
             Some(fitted) if fitted.form == form => fitted.clone(),
@@ -54,12 +54,12 @@ impl Sorted {
     }
 }
 
-/// Fit `form` to `table` without its outliers, which the remarks name.
+/// Fits `form` to `table` without its outliers, which the remarks name.
 pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
     sort_out(table).fit(form)
 }
 
-/// Leave out what stands far off the most flexible surface that can be fitted to the rest.
+/// Removes outliers from the most flexible surface that can be fitted to the rest.
 pub fn sort_out(table: &SigmaTable) -> Sorted {
     JUDGES.into_iter().find_map(|form| judged(table, form)).unwrap_or_else(|| all(table, None))
 }
@@ -97,14 +97,14 @@ fn judged(table: &SigmaTable, form: Form) -> Option<Sorted> {
     })
 }
 
-/// Where leaving out from one start came to rest.
+/// Converged result of the rejection from one start.
 struct End {
     off: Vec<usize>,
     surface: Surface,
     fitted: SigmaFit,
 }
 
-/// Leave out what stands off `surface`, fit `form` to the rest, look again; `None` if it cannot.
+/// Rejects outliers from `surface`, refits and repeats until nothing changes; `None` if it cannot.
 fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End> {
     let mut off = standing_off(table, &surface, &[]);
     for _ in 0..MAX_ROUNDS {
@@ -119,9 +119,9 @@ fn rejected(table: &SigmaTable, form: Form, mut surface: Surface) -> Option<End>
     None
 }
 
-/// The end with the least bounded loss, sum of min(t^2, OFF^2) over *all* rows, by the smallest
-/// scale any end has: a surface bent towards an outlier costs its neighbours more than the
-/// outlier, and one that left out good rows pays for each.
+/// The end with the least bounded loss, the sum of min(t^2, OFF^2) over *all* rows at the smallest scale of
+/// any end. A surface bent towards an outlier costs more at its neighbours than it gains at the outlier,
+/// and one that left out good rows pays for each.
 fn min_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     let scales: Vec<Vec<f64>> =
         ends.iter().map(|e| spread(table, &e.surface, |i| !e.off.contains(&i))).collect();
@@ -134,9 +134,9 @@ fn min_cost(table: &SigmaTable, ends: Vec<End>) -> Option<End> {
     ends.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// Too few rows to judge, or the fit leaves what sampling explains: no row off by itself (the robust
-/// scale is never below sampling), and together no more than sampling allows, as there would be if
-/// an outlier had bent the surface.
+/// Whether there are too few rows to judge, or sampling explains the residuals: no single row is off (the
+/// robust scale is never below sampling), and their sum does not exceed what sampling allows, as it would
+/// if an outlier had bent the surface.
 fn nothing_to_look_for(table: &SigmaTable, fitted: &SigmaFit) -> bool {
     let surface = Surface::of(table, fitted.form, &fitted.values(), fitted.free());
     let spare = table.rows.len() as f64 - surface.free as f64;
@@ -156,7 +156,7 @@ fn without(table: &SigmaTable, off: &[usize]) -> SigmaTable {
     SigmaTable { rows: rows.map(|(_, r)| *r).collect() }
 }
 
-/// Indices of the rows that are off the surface, by the scale of those not left out.
+/// Indices of the outlying rows, by the scale of those not left out.
 fn standing_off(table: &SigmaTable, surface: &Surface, left_out: &[usize]) -> Vec<usize> {
     let spread = spread(table, surface, |i| !left_out.contains(&i));
     (0..table.rows.len())

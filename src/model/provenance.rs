@@ -1,4 +1,4 @@
-//! What a model rests on: the views it was fitted to, what was looked for in them, and by whom.
+//! Provenance of a model: the views it was fitted to, what was searched in them, and by which program.
 
 use std::time::SystemTime;
 
@@ -45,12 +45,12 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// This program, now.
+    /// Of this program, now.
     pub fn now(seed: Option<u64>) -> Self {
         Self::at(seed, SystemTime::now())
     }
 
-    /// This program, at a time that the caller gives.
+    /// Of this program, at the given time.
     pub fn at(seed: Option<u64>, time: SystemTime) -> Self {
         Provenance {
             tool: "kinoise".into(),

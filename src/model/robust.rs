@@ -1,10 +1,10 @@
-//! A surface that a few wild sigmas cannot pull: Huber's estimate by pseudo-values.
+//! Robust fit of a surface that a few outliers cannot pull: Huber's M-estimate by pseudo-values.
 //!
-//! Every sigma is moved to within [`HUBER`] robust standard deviations of the current surface (on
-//! the logarithm, where a factor 30 and a thirtieth are alike), the form is fitted to these, and
-//! so on until the surface rests: the fixed point is Huber's M-estimate (Huber and Ronchetti,
-//! Robust Statistics, 2nd ed., 7.8.2, "modified residuals"), with no weights to carry through the
-//! fit. It starts from k z^2 with k the median of sigma/z^2, which up to half the rows cannot move.
+//! Every sigma is clamped to within [`HUBER`] robust standard deviations of the current surface (in the
+//! logarithm, where a factor of 30 and a thirtieth are alike) and the form is fitted to these values, until
+//! the surface converges. The fixed point is Huber's M-estimate (Huber and Ronchetti, Robust Statistics,
+//! 2nd ed., 7.8.2, "modified residuals"), without weights in the fit. It starts from k z^2 with k the median
+//! of sigma/z^2, which up to half the rows cannot move.
 
 use super::fit::fit_all;
 use super::forms::Form;
@@ -12,21 +12,21 @@ use crate::measure::{SigmaRow, SigmaTable};
 use crate::plane::MAD_TO_SIGMA;
 use crate::stats::median_in_place;
 
-/// Huber's constant: 95 % efficiency where the errors are Gaussian after all.
+/// Huber's constant: 95 % efficient for Gaussian errors.
 const HUBER: f64 = 1.345;
-/// What has not come to rest by then is judged as it is: leaving out and looking again follows.
+/// Without convergence the last surface is used: the rejection of outliers iterates further.
 const MAX_ROUNDS: usize = 10;
-/// The surface rests when no sigma of it moves by more than this share of a standard deviation:
-/// what follows asks about several of them.
+/// The surface has converged when no sigma moves by more than this share of a standard deviation; the outlier
+/// test that follows asks for several.
 const RESTS: f64 = 0.1;
-/// A relative error of 0.01 % squared: below it an exact table would call its rounding outliers.
+/// Least extra relative variance, (0.01 %)^2: below it the rounding of an exact table would give outliers.
 const MIN_EXTRA: f64 = 1e-8;
-/// A relative variance of one: no sensor's sigma is less certain than that.
+/// Largest extra relative variance: no sensor's sigma is less certain.
 const MAX_EXTRA: f64 = 1.0;
-/// Relative width at which the search for the extra variance ends: half of it on the scale.
+/// Relative accuracy of the extra variance; that of the standard deviation is half of it.
 const EXTRA_DIGITS: f64 = 1e-2;
 
-/// Sigma of the surface at every row of `table`, m, and how many parameters it took.
+/// Sigma of the surface at every row of `table`, m, and the number of its free parameters.
 pub(super) struct Surface {
     pub sigma: Vec<f64>,
     pub free: usize,
@@ -39,7 +39,7 @@ impl Surface {
         Surface { sigma, free }
     }
 
-    /// k z^2 by the median.
+    /// k z^2 with k the median of sigma/z^2.
     fn median(table: &SigmaTable) -> Self {
         let mut ratios: Vec<f32> =
             table.rows.iter().map(|r| (r.sigma_m / r.z_m.powi(2)).ln() as f32).collect();
@@ -66,7 +66,7 @@ pub(super) fn surface(table: &SigmaTable, form: Form) -> Option<Surface> {
     Some(current)
 }
 
-/// The table with every sigma within [`HUBER`] standard deviations of the surface.
+/// The table with every sigma clamped to within [`HUBER`] standard deviations of the surface.
 fn pulled_in(table: &SigmaTable, surface: &Surface, spread: &[f64]) -> SigmaTable {
     let pull = |((row, sigma), spread): ((&SigmaRow, &f64), &f64)| {
         let off = (row.sigma_m / sigma).ln().clamp(-HUBER * spread, HUBER * spread);
@@ -75,8 +75,8 @@ fn pulled_in(table: &SigmaTable, surface: &Surface, spread: &[f64]) -> SigmaTabl
     SigmaTable { rows: table.rows.iter().zip(&surface.sigma).zip(spread).map(pull).collect() }
 }
 
-/// Robust standard deviation of ln(measured/surface) of every row: sampling, plus an error that is
-/// the same for all and makes the median of the rows picked that of a Gaussian.
+/// Robust standard deviation of ln(measured/surface) of every row: sampling, plus an extra error common to
+/// all that gives the picked rows the median of a Gaussian.
 pub(super) fn spread(
     table: &SigmaTable,
     surface: &Surface,
@@ -89,7 +89,7 @@ pub(super) fn spread(
         .map(|i| ((table.rows[i].sigma_m / surface.sigma[i]).ln().abs(), sampling[i]))
         .collect();
     let n = picked.len() as f64;
-    // The fit has taken as much of the scatter as it has parameters.
+    // Corrects for the degrees of freedom that the fit used.
     let paid = (n / (n - surface.free as f64).max(1.0)).sqrt();
     let too_wide = |extra: f64| {
         let mut t: Vec<f32> =
@@ -100,7 +100,7 @@ pub(super) fn spread(
     sampling.iter().map(|s| (s + extra).sqrt()).collect()
 }
 
-/// The least extra variance at which the scatter is not too wide, by bisection of its logarithm.
+/// The least extra variance at which the scatter is not too wide, by bisection in the logarithm.
 fn extra_variance(too_wide: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (MIN_EXTRA, MAX_EXTRA);
     if !too_wide(low) {

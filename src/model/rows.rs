@@ -1,40 +1,40 @@
-//! Measured sigmas with their weights, ready for least squares.
+//! Measured sigmas with their weights, for least squares.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::measure::{SigmaRow, SigmaTable};
 use crate::stats::{between, paule_mandel};
 
-/// Rows grouped by view. The relative error of a row is taken as the sum of three independent
-/// ones: its sampling error (variance 1/(2 n_effective)), an error of its own (tau_cell) and one
-/// shared by the rows of its view (tau_view). Residuals are relative to the *model's* sigma, not
-/// the measured one: weights from the measurement favour what came out too small.
+/// Rows grouped by view. The relative error of a row is the sum of three independent ones: its sampling
+/// error (variance 1/(2 n_effective)), an error of its own (tau_cell) and one shared by the rows of its
+/// view (tau_view). Residuals are relative to the *model's* sigma, not the measured one: weights from the
+/// measurement would favour values that came out too small.
 #[derive(Debug, Clone)]
 pub struct Rows {
     rows: Vec<SigmaRow>,
-    /// Ranges of rows of one view.
+    /// Range of rows of each view.
     blocks: Vec<std::ops::Range<usize>>,
-    /// Sampling variance of the relative error; one everywhere when no n is known.
+    /// Sampling variance of the relative error; one for all rows when any n is unknown.
     sampling: Vec<f64>,
     counted: bool,
     /// Sigma that residuals are relative to, m.
     reference: Vec<f64>,
     steepest: f64,
-    /// Relative variance of each row's own error beyond sampling, and of what a view shares.
+    /// Relative variance of each row's own error beyond sampling, and of the error shared by a view.
     tau_cell2: f64,
     tau_view2: f64,
     whitener: Whitener,
 }
 
-/// What [`Rows::whiten`] multiplies with.
+/// Precomputed factors of [`Rows::whiten`].
 #[derive(Debug, Clone, Default)]
 struct Whitener {
     /// One over the standard deviation of a row's own relative error.
     root: Vec<f64>,
-    /// What a value is multiplied with: the same over the reference sigma, and where a view is one
-    /// row, its share of the view's common error too.
+    /// Factor of each value: `root` over the reference sigma, and for a view of a single row also the
+    /// shrinkage by the view's common error.
     scale: Vec<f64>,
-    /// Views of several rows: by how much their common error is shrunk.
+    /// Views of several rows, with the shrinkage of their common error.
     shared: Vec<(std::ops::Range<usize>, f64)>,
 }
 
@@ -91,12 +91,12 @@ impl Rows {
         crate::stats::range(self.rows.iter().map(column))
     }
 
-    /// Is the sampling error known (a table with n)?
+    /// Whether the sampling error is known (a table with n).
     pub fn counted(&self) -> bool {
         self.counted
     }
 
-    /// Distances that differ by more than `ratio`.
+    /// Number of distances that differ by more than `ratio`.
     pub fn distances(&self, ratio: f64) -> usize {
         let mut z: Vec<f64> = self.rows.iter().map(|r| r.z_m).collect();
         z.sort_by(f64::total_cmp);
@@ -104,7 +104,7 @@ impl Rows {
         z.len()
     }
 
-    /// Make residuals relative to these sigmas, m.
+    /// Makes residuals relative to these sigmas, m.
     pub fn refer_to(&mut self, sigma: impl Fn(&SigmaRow) -> f64) {
         self.reference = self.rows.iter().map(sigma).collect();
         self.weigh();
@@ -114,14 +114,15 @@ impl Rows {
         &self.reference
     }
 
-    /// What one unit of weighted chi-square is expected to be per degree of freedom.
+    /// Weighted chi-square per degree of freedom, for six parameters; at least 1 where the sampling error is
+    /// known.
     pub fn noise_scale(&self, chi2: f64) -> f64 {
         let found = chi2 / (self.len() as f64 - 6.0).max(1.0);
         found.max(if self.counted { 1.0 } else { f64::MIN_POSITIVE })
     }
 
-    /// Divide by the reference sigma and rotate, so that errors are independent and of unit variance:
-    /// for a view with variances D and shared tau^2, (D + tau^2 11')^(-1/2) in closed form.
+    /// Divides by the reference sigma and transforms so that errors are independent and of unit variance: for
+    /// a view with variances D and shared tau^2, by a root of (D + tau^2 11')^-1 in closed form.
     pub fn whiten(&self, column: &mut [f64]) {
         for (value, scale) in column.iter_mut().zip(&self.whitener.scale) {
             *value *= scale;
@@ -136,7 +137,7 @@ impl Rows {
         }
     }
 
-    /// Prepare the whitening; called whenever weights or reference change.
+    /// Prepares the whitening; called whenever weights or reference change.
     fn weigh(&mut self) {
         let w = &mut self.whitener;
         w.root = self.sampling.iter().map(|s| 1.0 / (s + self.tau_cell2).sqrt()).collect();
@@ -162,7 +163,7 @@ impl Rows {
         DVector::from_vec(y)
     }
 
-    /// Weighted least squares of sigma on `k` columns; `None` when they are not independent.
+    /// Weighted least squares of sigma on `k` columns; `None` when they are linearly dependent.
     pub fn solve_linear(&self, k: usize, fill: impl Fn(&SigmaRow, &mut [f64])) -> Option<Vec<f64>> {
         let n = self.len();
         if n < k {
@@ -197,8 +198,8 @@ impl Rows {
         Some(x.iter().zip(&scales).map(|(x, s)| x / s).collect())
     }
 
-    /// Set the two extra variances so that the relative residuals are as large as expected
-    /// (Paule and Mandel 1982, within views and between them); zero where sampling explains all.
+    /// Estimates the two extra variances from the relative residuals (Paule and Mandel 1982, within views
+    /// and between them); zero where sampling explains all.
     pub fn estimate_extra(&mut self, parameters: usize) {
         if !self.counted {
             return;
@@ -206,7 +207,7 @@ impl Rows {
         let residual: Vec<f64> =
             self.rows.iter().zip(&self.reference).map(|(r, s)| r.sigma_m / s - 1.0).collect();
         let within_dof = self.len() as f64 - self.views() as f64;
-        // With a row a view there is nothing within views but rounding.
+        // With one row per view there is nothing but rounding within views.
         self.tau_cell2 = if within_dof < 1.0 {
             0.0
         } else {
@@ -233,8 +234,8 @@ impl Rows {
         })
     }
 
-    /// Weighted mean of a view's residuals, its variance, the chi-square about it, and that one's
-    /// derivative by tau_cell^2 (the mean is where chi-square is least, so moving it adds nothing).
+    /// Weighted mean of a view's residuals, its variance, the chi-square about it, and the derivative of the
+    /// latter by tau_cell^2 (chi-square is least at the mean, so the mean's own change adds nothing).
     fn block(
         &self,
         block: &std::ops::Range<usize>,
@@ -262,7 +263,7 @@ impl Rows {
     }
 }
 
-/// Diagonal of R after columns were scaled to unit length: below this a column adds nothing new.
+/// Diagonal of R, for columns of unit length, below which a column is linearly dependent.
 const DEPENDENT: f64 = 1e-9;
 
 #[cfg(test)]
@@ -289,7 +290,7 @@ mod tests {
         rows
     }
 
-    /// Whitened products against the explicit inverse of the covariance.
+    /// Compares whitened products with the explicit inverse of the covariance.
     #[test]
     fn whitening_is_the_inverse_covariance() {
         let rows = rows();

@@ -1,5 +1,5 @@
-//! A finished fit: covariance, standard errors, figures of merit, and warnings where it should not be
-//! trusted as it stands.
+//! Statistics of a finished fit: covariance, standard errors, figures of merit, and warnings where it should
+//! not be trusted.
 
 use nalgebra::DMatrix;
 
@@ -14,9 +14,9 @@ use crate::read::MAX_NUMBER;
 pub struct Parameter {
     pub name: &'static str,
     pub value: f64,
-    /// `None` when the parameter was held.
+    /// `None` when the parameter was held fixed.
     pub std_error: Option<f64>,
-    /// Said where the data do not determine it.
+    /// Set where the data do not determine the parameter.
     pub remark: Option<String>,
 }
 
@@ -29,11 +29,11 @@ pub struct SigmaFit {
     pub domain: Domain,
     pub rows: usize,
     pub views: usize,
-    /// Sigmas that stand far off the surface and were not fitted.
+    /// Outliers, which were not fitted.
     pub left_out: Vec<SigmaRow>,
-    /// Views less free parameters (at least 1): what intervals' quantiles use.
+    /// Views less free parameters (at least 1), for the quantiles of intervals.
     pub degrees_of_freedom: f64,
-    /// Relative scatter that sampling does not explain, within views and between them.
+    /// Relative scatter beyond sampling, within views and between them.
     pub extra_within: f64,
     pub extra_between: f64,
     pub quality: Quality,
@@ -43,7 +43,7 @@ pub struct SigmaFit {
 }
 
 impl SigmaFit {
-    /// Why this is no model of a sensor at all, if so, and what to do.
+    /// Why the fit is not usable as a model of a sensor, if so, and what to do.
     pub fn is_no_model(&self) -> Option<(String, &'static str)> {
         const CHECK: &str = "check how raw values become metres, the intrinsics, and measurements.csv for views that measured something else than one flat target";
         const RECORD: &str = "record views at several distances and tilts";
@@ -62,13 +62,13 @@ impl SigmaFit {
         self.parameters.iter().filter(|p| p.std_error.is_some()).count()
     }
 
-    /// Variance of the relative residual, with the free parameters paid for.
+    /// Variance of the relative residual, corrected for the free parameters.
     pub fn relative_variance(&self) -> f64 {
         let n = self.rows as f64;
         self.quality.rmse_relative.powi(2) * n / (n - self.free() as f64).max(1.0)
     }
 
-    /// The surface without the story of its fit, as one along the optical axis.
+    /// The fitted surface, taken as a sigma along the optical axis.
     pub fn model(&self) -> SigmaModel {
         SigmaModel {
             form: self.form,
@@ -82,10 +82,10 @@ impl SigmaFit {
     }
 }
 
-/// A parameter whose standard error exceeds this share of its value is called not determined.
+/// A parameter whose standard error exceeds this share of its value counts as not determined.
 const WEAK: f64 = 0.5;
 
-/// The finished fit; `rows` refer to its surface.
+/// Assembles the finished fit; `rows` are relative to its surface.
 pub(super) fn report(
     form: Form,
     rows: &Rows,
@@ -133,8 +133,8 @@ pub(super) fn report(
     }
 }
 
-/// (J' C^-1 J)^-1 by singular values; directions the data do not see get no variance here and
-/// are named by [`name_parameters`].
+/// (J' C^-1 J)^-1 by SVD; directions that the data do not determine get a huge but finite variance, and
+/// [`name_parameters`] names them.
 fn covariance(
     rows: &Rows,
     spec: &dyn SigmaForm,
@@ -152,7 +152,7 @@ fn covariance(
         column /= *norm;
     }
     if j.nrows() < free.len() {
-        // Rows of zeros see nothing; without them the decomposition is short of directions.
+        // Pads with zero rows: without them the thin SVD would lack directions.
         j = j.resize_vertically(free.len(), 0.0);
     }
     let svd = j.svd(false, true);
@@ -169,18 +169,18 @@ fn covariance(
             full[(ia, ib)] = scale * sum / (norms[a] * norms[b]);
         }
     }
-    // What no row sees at all is known to no better than a number may be.
+    // Caps the variance of directions that no row determines.
     let cap = |i: usize| (MAX_VARIANCE / full[(i, i)].max(MAX_VARIANCE)).sqrt();
     let caps: Vec<f64> = (0..p.len()).map(cap).collect();
     DMatrix::from_fn(p.len(), p.len(), |i, j| full[(i, j)] * caps[i] * caps[j])
 }
 
-/// Of a parameter that a model may hold.
+/// Largest variance of a parameter in a model.
 const MAX_VARIANCE: f64 = 0.5 * MAX_NUMBER;
-/// A column of the Jacobian with a smaller norm is of none: its square must not run out of numbers.
+/// Floor of a Jacobian column's norm, so that its square does not underflow.
 const UNSEEN_NORM: f64 = 1e-100;
 
-/// Singular values below this share of the largest are rounding: a huge but finite variance.
+/// Singular values below this share of the largest are rounding errors, and are raised to it.
 const UNSEEN: f64 = 1e-10;
 
 fn name_parameters(
@@ -215,23 +215,23 @@ pub struct Quality {
     pub rmse_m: f64,
     pub rmse_relative: f64,
     pub r2: f64,
-    /// What rmse_relative would be from sampling alone; `None` when no n is known.
+    /// Expected rmse_relative from sampling alone; `None` when no n is known.
     pub sampling_relative: Option<f64>,
     /// Share of sigma's variance over the rows that neither the surface nor sampling explains.
     pub unexplained: f64,
 }
 
-/// Above this share the surface misses more of what differs between the views than a coefficient
-/// rounded to one digit would.
+/// Above this unexplained share the surface misses more of the differences between views than rounding a
+/// coefficient to one digit would.
 const MAX_UNEXPLAINED: f64 = 0.2;
-/// Below this the surface leaves more of what differs between the views than it explains.
+/// Below this r2 the surface leaves more of the differences between views than it explains.
 const MIN_R2: f64 = 0.5;
-/// Of sigma: what uses the model weighs by 1/sigma^2, and would be wrong by a factor of two.
+/// Largest relative error of sigma: weights are 1/sigma^2, and would be wrong by a factor of two.
 const MAX_ERROR: f64 = 0.5;
-/// Scatter this many times that of sampling is no accident, whatever the number of rows: chi^2
-/// per degree of freedom is its square.
+/// Scatter of this many times that of sampling is significant for any number of rows: chi^2 per degree of
+/// freedom is its square.
 const FAR_ABOVE_SAMPLING: f64 = 3.0;
-/// Fewer views cannot disagree with a surface.
+/// Fewest views that can contradict a surface.
 const MIN_VIEWS: usize = 3;
 
 impl Quality {
@@ -257,8 +257,8 @@ impl Quality {
         }
     }
 
-    /// Why the surface is no model at all, if so: it misses more than it explains, and sampling is
-    /// not the reason; or a sigma read off it is wrong by half.
+    /// Why the surface is useless as a model, if so: it misses more than it explains, and not because of
+    /// sampling; or its sigmas are wrong by half.
     pub fn explains_nothing(&self) -> Option<String> {
         let flat = self.r2 < MIN_R2 && self.unexplained > MAX_UNEXPLAINED;
         (flat || self.rmse_relative > MAX_ERROR).then(|| {
@@ -267,7 +267,7 @@ impl Quality {
         })
     }
 
-    /// The surface explains so little that the remarks warn of it first.
+    /// Whether the surface explains so little that the remarks warn of it first.
     pub fn is_poor(&self) -> bool {
         self.r2 < 0.0 || self.unexplained > MAX_UNEXPLAINED
     }
@@ -303,7 +303,7 @@ impl Quality {
     }
 }
 
-/// Said where the views are too few for the intervals to mean much.
+/// Warning where the views are too few for meaningful intervals.
 pub(super) fn few_views(views: usize, free: usize) -> Option<String> {
     let seen = if views == 1 { "one view".into() } else { format!("{views} views") };
     if views < MIN_VIEWS {
@@ -325,7 +325,7 @@ mod tests {
     use crate::model::fit::fit_all;
     use crate::read::MAX_NUMBER;
 
-    /// Walls that face the sensor to a rounding: what the tilt does to sigma is not seen.
+    /// Walls at normal incidence to within rounding: the effect of the tilt is not determined.
     #[test]
     fn what_no_view_shows_has_a_variance_that_can_be_written() {
         let row = |view: usize| {

@@ -1,4 +1,4 @@
-//! The surface sigma(z, theta) with where it holds and how sure it is.
+//! The surface sigma(z, theta), with its domain and uncertainty.
 
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -26,10 +26,10 @@ pub struct Domain {
     pub theta_rad: [f64; 2],
 }
 
-/// Degrees of freedom of what is taken as exact: Student's t is the normal there.
+/// Degrees of freedom of a surface taken as exact: Student's t is then the normal distribution.
 const EXACT: f64 = 1e9;
 
-/// The domain keeps this far from a form's pole, rad.
+/// Distance of the domain from a form's pole, rad.
 const POLE_MARGIN: f64 = 0.01;
 
 impl Domain {
@@ -50,12 +50,12 @@ impl Domain {
     }
 }
 
-/// A surface sigma(z, theta) that can be evaluated anywhere and never blows up.
+/// A surface sigma(z, theta) that can be evaluated anywhere without diverging.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmaModel {
     pub form: Form,
     pub parameters: Vec<f64>,
-    /// `None` for a parameter that was held.
+    /// `None` for a parameter that was held fixed.
     pub std_errors: Vec<Option<f64>>,
     pub covariance: DMatrix<f64>,
     pub domain: Domain,
@@ -64,7 +64,7 @@ pub struct SigmaModel {
 }
 
 impl SigmaModel {
-    /// A published surface, taken as exact, over a domain of one's own.
+    /// A published surface, taken as exact, over the given domain.
     pub fn published(form: Form, parameters: &[f64], domain: Domain) -> Self {
         let p = parameters.len();
         SigmaModel {
@@ -91,9 +91,9 @@ impl SigmaModel {
         Self::published(Form::Nguyen, &[0.0012, 0.0019, 0.4, 0.0001], domain)
     }
 
-    /// Khoshelham and Elberink 2012: half a step of disparity, measured on a plane faced squarely.
+    /// Khoshelham and Elberink 2012: half a step of disparity, measured on a plane at normal incidence.
     pub fn khoshelham() -> Self {
-        // A target that is faced by hand stands within ten degrees.
+        // A target aligned by hand is within ten degrees of normal incidence.
         let domain = Domain { z_m: [0.5, 5.0], theta_rad: [0.0, 10f64.to_radians()] };
         Self::published(Form::Khoshelham, &[1.425e-3], domain)
     }
@@ -105,8 +105,8 @@ impl SigmaModel {
         self.form.spec().sigma(&self.parameters, z, theta)
     }
 
-    /// Standard deviation of *depth*, m, whatever the model was fitted to: what everything that
-    /// adds or weighs noise along the optical axis asks for.
+    /// Standard deviation of *depth*, m, in whichever direction the model was fitted: for everything that
+    /// adds noise along the optical axis or weights by it.
     ///
     /// A depth error e moves the point by e cos(theta) across the plane on the optical axis (see
     /// [`crate::residual`]; off the axis the factor differs by the field's half angle at most), so
@@ -119,8 +119,8 @@ impl SigmaModel {
         }
     }
 
-    /// Logarithm of what the form goes on to outside the domain over [`SigmaModel::axial_sigma`]: 0 inside, NaN
-    /// where it goes on to nothing positive.
+    /// Logarithm of the form extrapolated outside the domain over [`SigmaModel::axial_sigma`]: 0 inside, NaN
+    /// where the extrapolation is not positive.
     pub fn ln_beyond_domain(&self, z: f64, theta: f64) -> f64 {
         let pole = self.form.spec().pole(&self.parameters);
         if pole.is_some_and(|pole| theta.abs() >= pole) {
@@ -138,8 +138,8 @@ impl SigmaModel {
         (continued / self.sigma(z, theta) * leans).ln()
     }
 
-    /// Lower and upper end of the interval that covers sigma with probability `level`: Student's
-    /// t on the logarithm, so that neither end is negative.
+    /// Interval that covers sigma with probability `level`: Student's t on the logarithm, so that neither
+    /// end is negative.
     pub fn interval(&self, z: f64, theta: f64, level: f64) -> [f64; 2] {
         let sigma = self.sigma(z, theta);
         let (z, theta) = self.domain.clamp(z, theta);
@@ -148,7 +148,7 @@ impl SigmaModel {
         [sigma / reach, sigma * reach]
     }
 
-    /// Covariance of ln sigma at these (z, theta), each taken to the nearest edge of the domain.
+    /// Covariance of ln sigma at these (z, theta), each clamped to the domain.
     pub fn log_covariance(&self, places: &[(f64, f64)]) -> DMatrix<f64> {
         let p = self.parameters.len();
         let mut slopes = DMatrix::zeros(places.len(), p);
@@ -162,7 +162,7 @@ impl SigmaModel {
         &slopes * &self.covariance * slopes.transpose()
     }
 
-    /// Standard error of the form at `z` and `theta`, m, also outside the domain: root of g' C g
+    /// Standard error of the form at `z` and `theta`, m, also outside the domain: the root of g' C g,
     /// with g the derivatives of sigma by the parameters.
     pub(super) fn std_error(&self, z: f64, theta: f64) -> f64 {
         let mut gradient = [0.0; MAX_PARAMETERS];
@@ -172,18 +172,18 @@ impl SigmaModel {
     }
 }
 
-/// [`SigmaModel::axial_sigma`], bilinear between nodes; outside the model's range its edge holds, as in the model.
+/// Table of [`SigmaModel::axial_sigma`], bilinear between nodes and held at the edge outside the domain.
 #[derive(Debug, Clone)]
 pub struct SigmaLookup {
     domain: Domain,
-    /// Tilt by tilt, m: what is faced squarely stands in a row.
+    /// m, in rows of constant tilt.
     nodes: Vec<f32>,
 }
 
-/// Over 4 m a step of 8 mm: the curvature 2b of Eq. 1 errs by b step^2 / 4 = 40 nm.
+/// Nodes over depth: 8 mm apart over 4 m, where the curvature 2b of Eq. 1 errs by b step^2 / 4 = 40 nm.
 const DEPTHS: usize = 512;
-/// Eq. 1 grows with 1 / (f - theta)^2: nodes crowd quadratically towards the steepest tilt, and at
-/// 0.01 rad from the pole the table errs by 0.6 %, at 0.1 rad by 0.06 %.
+/// Nodes over tilt. Eq. 1 grows as 1 / (f - theta)^2, so nodes crowd quadratically towards the steepest
+/// tilt; the error is 0.6 % at 0.01 rad from the pole and 0.06 % at 0.1 rad.
 const TILTS: usize = 256;
 
 impl SigmaLookup {
@@ -216,7 +216,7 @@ impl SigmaLookup {
     }
 }
 
-/// Node below a share (0 to 1) of the table's length, and the way on to the next.
+/// Node below a share (0 to 1) of the table's length, and the fraction to the next node.
 #[inline]
 fn cell(share: f32, nodes: usize) -> (usize, f32) {
     let place = share.clamp(0.0, 1.0) * (nodes - 1) as f32;
@@ -228,8 +228,8 @@ fn cell(share: f32, nodes: usize) -> (usize, f32) {
 mod tests {
     use super::*;
 
-    /// Held at the edges of its domain, 1 to 4 m: by what Eq. 1 is at half a metre, and across a plane by the
-    /// cosine too; beyond its pole it has no value.
+    /// Half a metre, outside the domain of 1 to 4 m, gives the ratio of Eq. 1 there to its edge value. For a
+    /// perpendicular sigma the cosines count, too; beyond the pole it is NaN.
     #[test]
     fn what_the_form_goes_on_to_is_told_beside_what_is_held() {
         let mut model = SigmaModel::paper();

@@ -1,11 +1,11 @@
-//! The uncertainty budgets that a calibration leaves in `model.json`.
+//! Uncertainty budgets that a calibration writes into `model.json`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::stats::Budget;
 
-/// What a budget of this kind is not: both standards prescribe artefacts, positions and limits.
+/// Statement that a budget is no test by these standards, which prescribe artefacts, positions and limits.
 pub const NO_ACCEPTANCE_TEST: &str = "a statement of uncertainty after the GUM (JCGM 100:2008), no acceptance or reverification \
     test after VDI/VDE 2634 or ISO 10360-13";
 

@@ -8,7 +8,7 @@ use crate::stats::{TUKEY, median_in_place};
 
 pub(crate) use crate::stats::MAD_TO_SIGMA;
 
-/// A robust plane and the scale of what it left.
+/// A robust plane and the scale of its residuals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AffineFit {
     pub plane: Plane,
@@ -21,21 +21,21 @@ pub struct AffineFit {
 /// How many pixels the last rounds use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
-    /// A regular sample of some ten thousand: to find things.
+    /// A regular sample of some ten thousand, for detection.
     Sample,
-    /// Every pixel: to measure things.
+    /// Every pixel, for measurement.
     AllPixels,
 }
 
-/// Pixels used while the weights settle; the last round uses all.
+/// Pixels used while the weights converge; with [`Effort::AllPixels`] the final rounds use all.
 const SETTLING_PIXELS: usize = 12_000;
 const SETTLING_ROUNDS: usize = 12;
 const FINAL_ROUNDS: usize = 2;
 
 /// Iteratively reweighted least squares of w on (x, y, 1) from a first guess.
 ///
-/// `pixels` index `w` (inverse depth, 1/m; NaN = none) and `rays`; `floor` is the least scale
-/// believed (the step of the depth code), 1/m. `None` when fewer than 12 pixels support a plane.
+/// `pixels` index `w` (inverse depth, 1/m; NaN = none) and `rays`; `floor` is the least plausible scale (by
+/// the step of the depth code), 1/m. `None` when fewer than 12 pixels support a plane.
 pub fn fit_affine_robust(
     w: &[f32],
     rays: &Rays,

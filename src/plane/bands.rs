@@ -1,7 +1,7 @@
-//! The target across bands of columns that firmware shifts by a step: no edge of the target.
+//! Finds the target across bands of columns that the firmware shifts by a step, which are no edges of it.
 //!
-//! Of any height and at any columns; those of a Kinect, of one step of its depth code, stop no search and are known
-//! better (`measure::ColumnSteps`).
+//! The steps may have any height and any columns. Those of a Kinect, of one step of its depth code, do not
+//! stop the search and are found more precisely by `measure::ColumnSteps`.
 
 use super::image::{InverseDepthImage, Target};
 use super::target::target_in;
@@ -9,28 +9,30 @@ use crate::rng::Stream;
 use crate::stats::{even, median_in_place, range};
 use crate::view::Region;
 
-/// Columns on either side of a step whose means are compared, twice: at a step, and for the slope.
+/// Columns in each of two windows on either side of a step: the inner ones give the step, both the slope.
 const WINDOW: usize = 4;
-/// Rows that are looked at, evenly over the image: the median of 120 is known to an eighth of sigma.
+/// Rows used, evenly over the image: the median of 120 has a standard error of an eighth of sigma.
 const ROWS: usize = 120;
-/// A column is judged by this many rows at least.
+/// Fewest rows to judge a column.
 const MIN_ROWS: usize = 30;
-/// Share of the rows that may step the other way, by their noise: what stands in the scene ends somewhere, a band of
-/// the firmware goes through all of the picture.
+/// Share of the rows that may step the other way, by noise: objects in the scene end somewhere, while a band
+/// of the firmware spans the whole picture.
 const TAIL: f64 = 0.1;
-/// The steps of a picture are one step of the firmware, measured to this factor about their median; others are the
-/// upright edges of a board that is higher than the picture.
+/// Largest ratio of a step to the median of the steps, which are all one step of the firmware; others are the
+/// vertical edges of a board that is higher than the picture.
 const MAX_UNEQUAL: f64 = 2.0;
-/// Bands are equally wide, and steps of some may be hidden: distances are multiples of the least to this share of it.
+/// Bands are equally wide, but some steps may be hidden: distances are multiples of the least one, to this
+/// share of it.
 const UNEVEN: f64 = 0.15;
-/// Two steps are found between three doors; a Kinect has up to eight bands (OpenNI, GmcMode).
+/// Fewest steps: three doors give two, and a Kinect has up to eight bands (OpenNI, GmcMode).
 const MIN_STEPS: usize = 3;
-/// A band's step is more than so many steps of the depth code: most contours of a tilted plane are of one.
+/// Least height of a band's step, in steps of the depth code: most contours of a tilted plane are of one.
 const MIN_CODE_STEPS: f64 = 1.5;
-/// Where a larger share of the pixels equals the next one the noise is below the code: steps are its contours.
+/// Where a larger share of the pixels equals the next one, the noise is below the code's step, and steps are
+/// its contours.
 const MAX_EQUAL: f64 = 0.8;
 
-/// The plane in `region`, or else the one the principal point looks at; or why there is none.
+/// Finds the plane in `region`, or else the one at the principal point; or says why there is none.
 pub fn find_target(
     image: &InverseDepthImage<'_>,
     region: Option<&Region>,
@@ -50,14 +52,14 @@ pub fn find_target(
     }
 }
 
-/// Where bands of the firmware cut the target off it is larger without them by more than this: of three bands two
-/// are lost. What else steps at one column, such as contours of a steep plane, cuts nothing off.
+/// Least growth of the target without bands if they cut it off (of three bands two are lost). Other steps at
+/// one column, such as contours of a steep plane, cut nothing off.
 const CUT_BY_BANDS: f64 = 1.2;
 
 /// The image without its bands; `None` where it has none.
 ///
-/// Steps of a saw-tooth all go one way and are equal. They are taken out with the slope between them, so that
-/// the mean plane stays.
+/// Steps of a saw-tooth are equal and go one way. They are removed together with the slope between them, so
+/// that the mean plane stays.
 fn without_bands(image: &InverseDepthImage<'_>) -> Option<Vec<f32>> {
     let (width, steps) = (image.camera.width, bands_of(image)?);
     let stairs: Vec<f64> = (0..width)
@@ -67,7 +69,7 @@ fn without_bands(image: &InverseDepthImage<'_>) -> Option<Vec<f32>> {
     Some(image.w.iter().enumerate().map(|(i, w)| w - teeth[i % width]).collect())
 }
 
-/// Steps that are one step of the firmware: equal, one way, at even distances, and more than the code's.
+/// Steps of the firmware: equal, one way, at even distances, and larger than the code's.
 fn bands_of(image: &InverseDepthImage<'_>) -> Option<Vec<(usize, f32)>> {
     let contour = MIN_CODE_STEPS * (image.step)(median_inverse_depth(image));
     let mut steps = steps(image);
@@ -95,7 +97,7 @@ fn median_inverse_depth(image: &InverseDepthImage<'_>) -> f64 {
     median_in_place(&mut some).into()
 }
 
-/// First columns after a step, and its height, 1/m.
+/// First column after each step, and its height, 1/m.
 fn steps(image: &InverseDepthImage<'_>) -> Vec<(usize, f32)> {
     let (width, height) = (image.camera.width, image.camera.height);
     if width < 4 * WINDOW {
@@ -116,7 +118,7 @@ fn steps(image: &InverseDepthImage<'_>) -> Vec<(usize, f32)> {
         if other_way > tail { 0.0 } else { median }
     };
     let all: Vec<f32> = (0..width).map(step_at).collect();
-    // Beside a step the windows' slopes make two of half its height.
+    // Next to a step the slopes of the windows give two of half its height.
     let highest = |u: usize| {
         let around = u.saturating_sub(2 * WINDOW)..=(u + 2 * WINDOW).min(width - 1);
         all[u] != 0.0 && around.into_iter().all(|other| all[other].abs() <= all[u].abs())
@@ -124,7 +126,7 @@ fn steps(image: &InverseDepthImage<'_>) -> Vec<(usize, f32)> {
     (0..width).filter(|u| highest(*u)).map(|u| (u, all[u])).collect()
 }
 
-/// How far a row steps up before each column, beyond its slope on either side; NaN where a pixel lacks.
+/// Step of a row before each column, less its slope on either side; NaN where a pixel is missing.
 fn heights(row: &[f32]) -> Vec<f32> {
     let mean = |from: usize| row[from..from + WINDOW].iter().sum::<f32>() / WINDOW as f32;
     let height = |u: usize| {
@@ -138,7 +140,7 @@ fn heights(row: &[f32]) -> Vec<f32> {
     (0..row.len()).map(height).collect()
 }
 
-/// Less the line that fits the values best.
+/// Subtracts the best-fitting line.
 fn less_line(values: &[f64]) -> Vec<f32> {
     let n = values.len() as f64;
     let (middle, mean) = (0.5 * (n - 1.0), values.iter().sum::<f64>() / n);
@@ -158,7 +160,7 @@ mod tests {
 
     const NOISE: f64 = 0.001;
 
-    /// A wall of slope `slope` (1/m a column) with noise and something more.
+    /// A wall of slope `slope` (1/m per column) with noise and an added term.
     fn wall(slope: f64, more: impl Fn(usize, usize) -> f64) -> (Camera, Vec<f32>) {
         let camera = Camera::centred(320, 240, 290.0);
         let mut rng = Seed(7).stream("bands");
@@ -174,13 +176,13 @@ mod tests {
         in_code(image, 0.0)
     }
 
-    /// By a depth code with this step, 1/m.
+    /// With a depth code of this step, 1/m.
     fn in_code((camera, w): &(Camera, Vec<f32>), step: f64) -> Option<Vec<f32>> {
         let rays = camera.rays();
         without_bands(&InverseDepthImage { w, rays: &rays, camera, step: &|_| step })
     }
 
-    /// Of a saw-tooth of either direction, on a tilted wall, less than a sigma is left.
+    /// Less than a sigma is left of a saw-tooth of either direction on a tilted wall.
     #[test]
     fn a_saw_tooth_goes_and_the_plane_stays() {
         for (slope, tooth) in [(0.0, 0.01), (5e-4, 0.01), (-5e-4, -0.03)] {
@@ -198,7 +200,7 @@ mod tests {
         }
     }
 
-    /// The wall is found whole, and told how; a wall without bands is found as ever.
+    /// The wall is found whole, with a note; a wall without bands is found as usual.
     #[test]
     fn bands_do_not_cut_the_target_off() {
         for (tooth, banded) in [(0.02, true), (0.0, false)] {
@@ -212,7 +214,7 @@ mod tests {
         }
     }
 
-    /// Contours of a depth code on a tilted plane: of its own step.
+    /// Contours of a depth code on a tilted plane have the height of its step.
     #[test]
     fn steps_of_the_code_are_no_bands() {
         let saw = |u: usize, _: usize| 0.01 * ((u + 13) as f64 / 53.0).fract();
@@ -220,7 +222,7 @@ mod tests {
         assert!(in_code(&wall(5e-4, saw), 0.01).is_none());
     }
 
-    /// Edges of a board, of a shelf's boards, of one door or of three are no bands of the firmware.
+    /// Edges of a board, of shelves, of one door or of three are no bands of the firmware.
     #[test]
     fn what_stands_in_the_scene_is_no_band() {
         assert!(found(&wall(2e-4, |_, _| 0.0)).is_none());

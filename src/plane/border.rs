@@ -1,11 +1,11 @@
-//! Where the target's edge leaves the picture at a slant.
+//! Handles target edges that leave the picture at a slant.
 
 use super::grow::Lattice;
 use super::image::InverseDepthImage;
 
-/// Pixels without a measurement, in nodes at the picture's border, that lie beside the target and not on it: those
-/// reached over such pixels from nodes that are not its own. An edge that leaves the picture within a node cuts off
-/// pixels which no erosion of nodes finds, for beyond the border there are none.
+/// Unmeasured pixels in nodes at the picture's border that lie beside the target, not on it: those connected
+/// over such pixels to nodes outside the target. Where an edge leaves the picture within a node, erosion does
+/// not find them, because there are no nodes beyond the border.
 pub(super) fn beside(
     image: &InverseDepthImage<'_>,
     lattice: &Lattice,

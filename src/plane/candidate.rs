@@ -1,4 +1,4 @@
-//! One plane grown from a window around the principal point, and what speaks for it.
+//! A candidate plane grown from a window around the principal point, and its quality.
 
 use super::affine::{AffineFit, Effort, fit_affine_robust};
 use super::grow::{BEND_M, Gauge, Lattice};
@@ -13,21 +13,21 @@ use crate::stats::normal_cut_factor;
 pub(super) struct Candidate {
     pub fit: AffineFit,
     pub mask: Vec<bool>,
-    /// Share of the measured pixels around the principal point that lie on it.
+    /// Share of the measured pixels around the principal point that are on the plane.
     pub at_centre: f64,
     /// Distance of the nearest node from the principal point, px.
     pub away_px: f64,
-    /// Its residual is noise, not relief.
+    /// Whether its residual is noise, not relief.
     pub flat: bool,
-    /// Larger than the palm of a hand.
+    /// Whether it is larger than the palm of a hand.
     pub roomy: bool,
 }
 
-/// Times that what belongs to other planes is taken out and the target grown again.
+/// Rounds at most in which nodes of other planes are removed and the target grown again.
 const RIVAL_ROUNDS: usize = 3;
 const GROWING_ROUNDS: usize = 12;
-/// The scale may grow to this many times the seed's before it means another surface: smooth
-/// errors of lens and board show over the whole target that a small seed does not see.
+/// Largest growth of the scale over the seed's; more means another surface. Smooth errors of lens and board
+/// show over the whole target, but not in a small seed.
 const SCALE_GROWTH: f64 = 2.0;
 
 pub(super) fn candidate(
@@ -74,12 +74,12 @@ pub(super) fn candidate(
     Some(found)
 }
 
-/// A target that goes on smoothly beyond its plane over more than this share of its outline is
-/// cut out of a curved surface. A board that a wall crosses goes on along one of its four sides.
+/// A target that continues smoothly beyond its plane over more than this share of its outline is part of a
+/// curved surface. A board that a wall crosses continues along one of its four sides.
 const CURVED: f64 = 0.6;
 
-/// Where half of the pixels share one code the median absolute deviation is blind; then the
-/// standard deviation inside a cut of itself. 1/m.
+/// Scale of a fit, 1/m. The median absolute deviation fails where half of the pixels share one code; there
+/// it is the standard deviation within a cut at multiples of itself.
 fn settled_scale(image: &InverseDepthImage<'_>, fit: &AffineFit, pixels: &[u32]) -> f64 {
     let step = (image.step)(fit.plane.q.z.abs());
     let mut scale = fit.scale;
@@ -102,7 +102,7 @@ fn settled_scale(image: &InverseDepthImage<'_>, fit: &AffineFit, pixels: &[u32])
     scale.min(step)
 }
 
-/// The cut, as everywhere for sigma: 0.05 % of a Gaussian lies beyond.
+/// The cut, as everywhere for sigma: 0.05 % of a Gaussian is beyond.
 const SETTLING_SIGMAS: f64 = 3.5;
 const SETTLING_ROUNDS: usize = 4;
 
@@ -114,7 +114,7 @@ fn pixels_of(image: &InverseDepthImage<'_>, lattice: &Lattice, mask: &[bool]) ->
         .collect()
 }
 
-/// Grow from the seeds until nothing changes, refitting as the plane becomes better known.
+/// Grows from the seeds until nothing changes, refitting as the plane becomes better known.
 fn grown(
     image: &InverseDepthImage<'_>,
     lattice: &Lattice,
@@ -147,14 +147,14 @@ fn grown(
     Some((fit, mask))
 }
 
-/// Around the principal point, a disc of this share of the width is "what it looks at".
+/// Half size of the window that the principal point looks at, as a share of the width.
 const CENTRE_DISC: f64 = 0.0125;
-/// Relief: residual over local noise above which a surface is not flat, and the more lenient one
-/// for surfaces over four percent of the image (a lens may bend a near wall that much).
+/// Limit of residual over local noise for a flat surface, and the more lenient one for surfaces over four
+/// percent of the image (a lens may bend a near wall that much).
 const RELIEF: f64 = 4.0;
 const RELIEF_LARGE: f64 = 8.0;
 const LARGE: f64 = 0.04;
-/// The palm of a hand is below this, a sheet of paper three times above, m^2.
+/// Least area of a target, m^2: the palm of a hand is smaller, a sheet of paper three times larger.
 const MIN_AREA_M2: f64 = 0.02;
 
 pub(super) fn centre_disc(camera: &Camera) -> Vec<u32> {
@@ -198,7 +198,7 @@ fn judge(
     }
 }
 
-/// Area on the plane that the nodes cover, m^2: a pixel covers z^3 |q| / (fx fy).
+/// Area of the plane that the nodes cover, m^2: a pixel covers z^3 |q| / (fx fy).
 fn area(image: &InverseDepthImage<'_>, lattice: &Lattice, plane: &Plane, samples: &[u32]) -> f64 {
     let node = (lattice.pitch * lattice.pitch) as f64 / (image.camera.fx * image.camera.fy);
     let cube = |&i: &u32| plane.depth_at(image.rays, i as usize).powi(3);

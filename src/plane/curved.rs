@@ -1,7 +1,7 @@
-//! A surface that is smooth but no plane, over all that was asked for: a wall as a sensor shows it that
-//! gives the range for the depth, or whose lens bends the picture. What bends it is for the diagnosis to
-//! say, so such a view is measured and noted instead of refused. Corners, spheres and clutter are refused
-//! as before: no polynomial follows them.
+//! Accepts a smooth but bent surface over the whole region: a wall seen by a sensor that gives the range
+//! instead of the depth, or whose lens bends the picture. The diagnosis finds the cause, so such a view is
+//! measured with a note instead of refused. Corners, spheres and clutter are still refused: no polynomial
+//! fits them.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -11,24 +11,24 @@ use super::image::{Exclusions, InverseDepthImage, MIN_PIXELS, Target};
 use crate::stats::{TUKEY, median_in_place};
 use crate::units::{shortest, to_digits};
 
-/// Terms of a polynomial of the fourth degree in (x, y): of 1/cos, which the range over a wall
-/// follows, it leaves 0.1 % at 40 degrees off the axis.
+/// Terms of a polynomial of the fourth degree in (x, y): its error for 1/cos, which the range over a wall
+/// follows, is 0.1 % at 40 degrees off the axis.
 const TERMS: usize = 15;
 const DEGREE: i32 = 4;
 /// Pixels that the polynomial is fitted to.
 const SAMPLES: usize = 6000;
 const ROUNDS: usize = 8;
-/// Smooth is what leaves no more than this many times the image's local noise: the same as for a plane.
+/// Largest residual of a smooth surface, as a multiple of the image's local noise: the same as for a plane.
 const SMOOTH: f64 = 4.0;
-/// ... and what holds this share of the measured pixels within the biweight.
+/// ... and the least share of the measured pixels within the biweight.
 const HELD: f64 = 0.9;
-/// A picture of which less is measured shows a thing, not a wall.
+/// Least measured share: a picture with less shows an object, not a wall.
 const MIN_MEASURED: f64 = 0.6;
-/// Nothing that a sensor does to a plane is larger than the range in place of the depth, by this factor
-/// for what tilt makes of it. A ball bends more over so small a part of the picture.
+/// Largest bend, relative to that of a range in place of the depth, which no error of a sensor exceeds; the
+/// factor allows for tilt. A ball bends more over so small a part of the picture.
 const MAX_BEND: f64 = 1.2;
 
-/// The whole of `inside` as a target, if one smooth surface fills it. `valid` are its measured pixels.
+/// Returns all of `inside` as a target, if one smooth surface fills it. `valid` are its measured pixels.
 pub(super) fn curved_target(
     image: &InverseDepthImage<'_>,
     inside: &[u32],
@@ -74,7 +74,7 @@ fn target(
         shortest(to_digits(100.0 * bend, 2))
     );
     let on_plane = |&i: &u32| fit.plane.inverse_depth_at(image.rays, i as usize);
-    // Holes farther than all that is measured are out of the sensor's range, and no losses.
+    // Holes farther than all measured pixels are beyond the sensor's range, not losses.
     let farthest = valid.iter().map(on_plane).fold(f64::INFINITY, f64::min);
     let pixels = inside.iter().copied().filter(|i| on_plane(i) >= farthest).collect();
     Target { pixels, plane: fit.plane, scale: fit.scale, exclusions, notes: vec![note] }
@@ -133,7 +133,7 @@ impl Surface {
         self.coefficients.dot(&terms(x, y))
     }
 
-    /// The plane that touches it on the axis.
+    /// The tangent plane on the axis.
     fn tangent(&self) -> nalgebra::Vector3<f64> {
         let c = &self.coefficients;
         nalgebra::Vector3::new(c[2], c[1], c[0])

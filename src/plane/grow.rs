@@ -1,9 +1,9 @@
-//! Region growing over the image: which pixels hang together on one plane.
+//! Region growing over the image: finds the connected pixels on one plane.
 //!
-//! A single pixel scatters by sigma, and a wall that a tilted board nearly touches is within a
-//! few sigma of the board's plane over a long way. So not pixels are judged but neighbourhoods:
-//! their mean and their spread about the plane. And a plane known from a small patch says little
-//! far from it, so a round grows only as far as the plane's own standard error stays below sigma.
+//! A single pixel scatters by sigma, and a wall that a tilted board nearly touches is within a few sigma of
+//! the board's plane over a long distance. So neighbourhoods are judged instead of pixels, by their mean and
+//! their spread about the plane. A plane known from a small patch is uncertain far from it, so a round grows
+//! only as far as the plane's own standard error is below sigma.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,48 +12,48 @@ use crate::camera::Rays;
 
 /// A coarse lattice over the image: one node for every `pitch` x `pitch` pixels.
 ///
-/// Growing on the lattice costs a tenth of growing on pixels, and bridges single dead pixels.
+/// Growing on it costs a tenth of growing on pixels, and bridges single dead pixels.
 pub(super) struct Lattice {
     pub pitch: usize,
     pub columns: usize,
     pub rows: usize,
-    /// Pixel index of each node's sample; `None` where the cell holds no measurement.
+    /// Pixel index of each node's sample; `None` where the node has no measured pixel.
     sample: Vec<Option<u32>>,
     /// Means over each node's measured pixels: ray (x, y, 1) and inverse depth, 1/m.
     mean: Vec<Option<(Vector3<f64>, f64)>>,
 }
 
-/// Nodes in a row of the image; 3 px pitch on a 640 px image.
+/// Nodes in a row of the image: a pitch of 3 px on a 640 px image.
 const NODES_A_ROW: f64 = 213.0;
-/// A node is judged by the nodes this far around it: 15 px on a 640 px image, wider than the
-/// matching window of a Kinect v1, 9 px (Konolige and Mihelich 2011), which correlates its noise.
+/// Radius of a node's neighbourhood in nodes: 15 px across on a 640 px image, wider than the matching window
+/// of a Kinect v1, 9 px (Konolige and Mihelich 2011), which correlates its noise.
 const AROUND: usize = 2;
-/// The mean of a neighbourhood is off by less than this many sigma: smooth errors of lens and
-/// board pass (at 2.5 the rims of real boards were lost), noise alone moves the mean by 0.6 where 9 px are correlated.
+/// Limit of a neighbourhood's mean in sigma: smooth errors of lens and board pass (at 2.5 the rims of real
+/// boards were lost), and noise alone moves the mean by 0.6 where 9 px are correlated.
 const MEAN_SIGMAS: f64 = 5.0;
-/// ... and it scatters about its own mean by less than this. Noise correlated over 9 px leaves
-/// below 1 with a spread of 0.4; a wall that crosses the plane at an angle grows without bound.
+/// ... and of its spread about its own mean. Noise correlated over 9 px gives below 1 with a scatter of 0.4;
+/// a wall that crosses the plane at an angle grows without bound.
 const SPREAD_SIGMAS: f64 = 1.5;
-/// ... or than this many times what adjacent nodes differ: white noise has a ratio of 1, and of
-/// 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood one of 2.6.
+/// ... or of the ratio of its spread to the roughness between adjacent nodes. White noise has a ratio of 1,
+/// and of 1.5 where 9 px are correlated; a wall over a fifth of the neighbourhood gives 2.6.
 const SPREAD_PER_ROUGHNESS: f64 = 2.0;
-/// Single nodes at the edge are on the plane within this: they have no neighbourhood to help.
+/// Limit of the residual of single nodes at the edge, which have no neighbourhood, in sigma.
 const EDGE_SIGMAS: f64 = 2.5;
-/// In sums residuals count at most this many sigma, so that one gross error decides nothing.
+/// Residuals in sums are clipped to this many sigma, so that no single gross error decides.
 const CLIP_SIGMAS: f32 = 6.0;
-/// What is off by less just misses the plane: a surface that curves away passes through here.
+/// Nodes off by less than this many sigma just miss the plane: a surface that curves away passes here.
 const MISS_SIGMAS: f64 = 8.0;
-/// Nodes to an independent sample: that window, 9 x 9 px, at 3 px to a node.
+/// Nodes per independent sample: the matching window, 9 x 9 px, at 3 px per node.
 const CORRELATED_NODES: f64 = 9.0;
-/// Sigma is taken for at least this much, m: lens errors of a Kinect bend a near wall (0.56 m)
-/// by 8 mm where its noise is a millimetre, and 5 sigma shall hold that.
+/// Floor of sigma, m: lens errors of a Kinect bend a near wall (0.56 m) by 8 mm where its noise is a
+/// millimetre, and this must be within 5 sigma.
 pub(super) const BEND_M: f64 = 0.002;
 
-/// A plane and the yardstick along it.
+/// A plane with the scale of its residuals.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gauge<'f> {
     pub fit: &'f AffineFit,
-    /// Least sigma, m.
+    /// Floor of sigma, m.
     pub bend_m: f64,
 }
 
@@ -66,7 +66,7 @@ impl Gauge<'_> {
 
 #[cfg(test)]
 impl Lattice {
-    /// Of nodes without pixels.
+    /// A lattice of nodes without pixels.
     pub fn bare(columns: usize, rows: usize) -> Self {
         let n = columns * rows;
         Lattice { pitch: 1, columns, rows, sample: vec![None; n], mean: vec![None; n] }
@@ -113,7 +113,7 @@ impl Lattice {
         self.sample.iter().map(Option::is_some)
     }
 
-    /// Residual of each node's mean in the gauge's sigma, at most [`MISS_SIGMAS`]; NaN without any.
+    /// Residual of each node's mean in sigma, clamped to [`MISS_SIGMAS`]; NaN without a measurement.
     pub fn residuals(&self, gauge: &Gauge<'_>) -> Vec<f32> {
         let q = gauge.fit.plane.q;
         self.mean
@@ -130,11 +130,11 @@ impl Lattice {
             .collect()
     }
 
-    /// Nodes whose neighbourhood, by mean and by spread, is noise about the plane.
+    /// Nodes whose neighbourhood, by mean and spread, is noise about the plane.
     ///
-    /// Noise may be larger there than at the seed (a depth error that does not grow with depth, on
-    /// the near side of a tilted target), or hold gross errors: then neighbours differ as much as
-    /// the neighbourhood spreads. Where another surface begins they do not.
+    /// The noise may be larger there than at the seed (a depth error that does not grow with depth, on the
+    /// near side of a tilted target), or include gross errors. Then adjacent nodes differ as much as the
+    /// neighbourhood spreads; where another surface begins they do not.
     pub fn quiet(&self, residuals: &[f32]) -> Vec<bool> {
         let sums = self.boxed(residuals);
         let rough = self.roughness(residuals);
@@ -152,7 +152,7 @@ impl Lattice {
             .collect()
     }
 
-    /// Half the mean squared difference of adjacent nodes: the variance, were the noise white.
+    /// Half the mean squared difference of adjacent nodes: the variance if the noise is white.
     fn roughness(&self, residuals: &[f32]) -> Vec<f64> {
         let pairs: Vec<[f32; 2]> = (0..residuals.len())
             .map(|node| {
@@ -209,8 +209,8 @@ impl Lattice {
         both
     }
 
-    /// Nodes at which the plane through the set nodes is known to better than one sigma: the
-    /// leverage r' (sum r r')^-1 r of their rays, in independent samples.
+    /// Nodes at which the plane through the set nodes has a standard error below one sigma: by the leverage
+    /// r' (sum r r')^-1 r of their rays, with independent samples.
     pub fn known(&self, mask: &[bool]) -> Option<Vec<bool>> {
         let mut information = Matrix3::zeros();
         for (ray, _) in self.mean.iter().zip(mask).filter(|(_, m)| **m).filter_map(|(s, _)| *s) {
@@ -221,9 +221,9 @@ impl Lattice {
         Some(self.mean.iter().map(|mean| mean.is_some_and(|(ray, _)| known(&ray))).collect())
     }
 
-    /// Share of the outline that misses the plane by little: where a board ends depth steps, where
-    /// a curved surface leaves its plane it does not. The outline is taken two nodes out, as those
-    /// next to the rim mix both sides of a step; the image's border is outline, too.
+    /// Share of the outline that just misses the plane: depth steps where a board ends, but not where a
+    /// curved surface leaves its plane. The outline is two nodes out, because those next to the rim mix
+    /// both sides of a step; the image's border is outline, too.
     pub fn curving_away(&self, mask: &[bool], residuals: &[f32]) -> f64 {
         let next = self.dilated(mask);
         let (mut outline, mut near) = (0u32, 0u32);
@@ -239,8 +239,8 @@ impl Lattice {
         f64::from(near) / f64::from(outline.max(1))
     }
 
-    /// With the edge that judging by neighbourhoods costs: nodes within a neighbourhood of the set ones
-    /// that lie on the plane themselves.
+    /// Adds the edge that is lost when judging by neighbourhoods: nodes within a neighbourhood of the set
+    /// ones that are on the plane themselves.
     pub fn with_edge(&self, mask: &[bool], residuals: &[f32], barred: &[bool]) -> Vec<bool> {
         let mut wide = mask.to_vec();
         for _ in 0..AROUND {

@@ -1,4 +1,4 @@
-//! A depth image as the search for the target sees it, and the first plane through some pixels.
+//! The depth image for the target search, and the first plane through some pixels.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,9 +12,9 @@ use crate::stats::median_in_place;
 /// The pixels of the target and a first plane through them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
-    /// Indices into the image, ascending. All pixels of the target's region, also those without a
-    /// measurement and those off the plane: holes and gross errors belong to the sensor's noise. Without those at the picture's
-    /// border that lie beside it.
+    /// Indices into the image, ascending: all pixels of the target's region, except those at the picture's
+    /// border that lie beside it. Pixels without a measurement and off the plane are included, because holes
+    /// and gross errors belong to the sensor's noise.
     pub pixels: Vec<u32>,
     pub plane: Plane,
     /// Robust standard deviation about the plane, inverse depth, 1/m.
@@ -35,7 +35,7 @@ pub struct Exclusions {
     pub edge: usize,
 }
 
-/// A depth image as the target search sees it: inverse depth (1/m, NaN = none).
+/// A depth image for the target search, in inverse depth (1/m, NaN = none).
 pub struct InverseDepthImage<'a> {
     pub w: &'a [f32],
     pub rays: &'a Rays,
@@ -44,23 +44,23 @@ pub struct InverseDepthImage<'a> {
     pub step: &'a (dyn Fn(f64) -> f64 + Sync),
 }
 
-/// A target has at least so many pixels.
+/// Fewest pixels of a target.
 pub(crate) const MIN_PIXELS: usize = 300;
 /// Pixels within this many robust standard deviations belong to the plane.
 const REACH_SIGMAS: f64 = 5.0;
 /// ... and pixels within this distance always do: lens errors of a Kinect bend a near wall by
 /// 8 mm, while a hand holding a board stands off by more.
 const REACH_FLOOR_M: f64 = 0.010;
-/// Standard deviation below which no structured-light sensor was ever measured, as a + b z^2
-/// (m): half of Khoshelham and Elberink's 1.425e-3 z^2 and a millimetre of rounding.
+/// Lower bound of any structured-light sensor's standard deviation, as a + b z^2 (m): half of Khoshelham and
+/// Elberink's 1.425e-3 z^2, and of a millimetre of rounding.
 const SIGMA_FLOOR_M: f64 = 0.0005;
 const SIGMA_FLOOR_PER_M: f64 = 0.0007;
 
-/// No surface scatters by more than this share of its distance: a Kinect at 8 m reaches 2 %.
+/// Largest scatter of a surface, as a share of its distance: a Kinect at 8 m reaches 2 %.
 const ROUGHEST: f64 = 0.05;
 
 impl InverseDepthImage<'_> {
-    /// Least standard deviation believed at inverse depth `w`, 1/m.
+    /// Least plausible standard deviation at inverse depth `w`, 1/m.
     pub(super) fn floor(&self, w: f64) -> f64 {
         (0.3 * (self.step)(w)).max(SIGMA_FLOOR_M * w * w + SIGMA_FLOOR_PER_M)
     }
@@ -69,9 +69,9 @@ impl InverseDepthImage<'_> {
         (REACH_SIGMAS * scale).max(REACH_FLOOR_M * w * w)
     }
 
-    /// Noise of the image itself, whatever its shape: second differences over nine pixels are blind to
-    /// planes and wider than a matching window's correlation. Nine is odd, and rows and columns are both
-    /// asked: what alternates from line to line is the sensor's, not the target's relief.
+    /// Local noise of the image, whatever its shape: second differences over nine pixels cancel planes and
+    /// are wider than a matching window's correlation. Nine is odd, and both rows and columns are used: an
+    /// error that alternates from line to line is the sensor's noise, not relief.
     pub(super) fn local_noise(&self, pixels: &[u32]) -> f64 {
         const LAG: usize = 9;
         let width = self.camera.width;
@@ -91,7 +91,7 @@ impl InverseDepthImage<'_> {
         if mad.is_finite() { MAD_TO_SIGMA * mad / 6f64.sqrt() } else { 0.0 }
     }
 
-    /// Does the residual of a fit exceed what any sensor scatters?
+    /// Whether the residual of a fit exceeds the scatter of any sensor.
     pub(super) fn too_rough(&self, fit: &AffineFit, pixels: &[u32]) -> bool {
         let mut w: Vec<f32> = pixels.iter().map(|&i| self.w[i as usize]).collect();
         fit.scale > ROUGHEST * f64::from(median_in_place(&mut w))
@@ -102,7 +102,7 @@ impl InverseDepthImage<'_> {
     }
 }
 
-/// Does the pixel's ray meet the plane before the camera?
+/// Whether the pixel's ray meets the plane in front of the camera.
 pub(super) fn in_front(image: &InverseDepthImage<'_>, plane: &Plane, i: usize) -> bool {
     plane.inverse_depth_at(image.rays, i) > 0.0
 }
@@ -112,11 +112,11 @@ pub(super) fn on_plane(image: &InverseDepthImage<'_>, fit: &AffineFit, i: usize)
     expected > 0.0 && (f64::from(image.w[i]) - expected).abs() < image.reach(expected, fit.scale)
 }
 
-/// Hypotheses for a seed: enough for a plane that holds a quarter of the window.
+/// Hypotheses for a seed: enough for a plane that covers a quarter of the window.
 const SEED_HYPOTHESES: usize = 300;
 const SEED_SAMPLES: usize = 900;
 
-/// RANSAC on a sample of `pixels`, affine through three, then the robust fit on all of them.
+/// Fits a first plane: RANSAC on a sample of `pixels`, affine through three, then the robust fit on all.
 pub(super) fn seed_plane(
     image: &InverseDepthImage<'_>,
     pixels: &[u32],
@@ -141,7 +141,7 @@ pub(super) fn seed_plane(
     let hypothesis = |three: [usize; 3]| {
         let [a, b, c] = three.map(|i| rows[i]);
         let m = Matrix3::from_rows(&[a.0.transpose(), b.0.transpose(), c.0.transpose()]);
-        // Twice the area of the triangle in the normalised image: thin ones extrapolate badly.
+        // Twice the area of the triangle in the normalised image; thin triangles extrapolate badly.
         if m.determinant().abs() < 1e-6 {
             return None;
         }

@@ -2,9 +2,9 @@
 //!
 //! In inverse depth w = 1/z a plane is *exactly* affine in the normalised image coordinates:
 //! n . X = rho with X = z (x, y, 1) gives w = (n . (x, y, 1)) / rho. A structured-light sensor
-//! measures disparity, a multiple of w, so its noise is uniform there too; an orthogonal
-//! least-squares plane on the points takes noise along the ray for noise across the plane, and
-//! steepens small, far, tilted targets (0.3 to 1 degree on the real views beyond 2.4 m).
+//! measures disparity, a multiple of w, so its noise is uniform there too. An orthogonal
+//! least-squares plane through the points treats noise along the ray as noise across the plane, and
+//! steepens small, far, tilted targets (by 0.3 to 1 degree on the real views beyond 2.4 m).
 
 mod affine;
 mod bands;
@@ -66,14 +66,14 @@ impl Plane {
         1.0 / self.inverse_depth(x, y)
     }
 
-    /// As [`Plane::inverse_depth`], of pixel `i`.
+    /// As [`Plane::inverse_depth`], for pixel `i`.
     #[inline]
     pub fn inverse_depth_at(&self, rays: &Rays, i: usize) -> f64 {
         let (x, y) = rays.at(i);
         self.inverse_depth(x, y)
     }
 
-    /// As [`Plane::depth`], of pixel `i`.
+    /// As [`Plane::depth`], for pixel `i`.
     pub fn depth_at(&self, rays: &Rays, i: usize) -> f64 {
         1.0 / self.inverse_depth_at(rays, i)
     }
@@ -109,7 +109,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Points made from the normal form lie on the other, and the pose angles come back.
+        /// Points by inverse depth satisfy the normal form, and the pose angles are recovered.
         #[test]
         fn the_two_forms_agree(z in 0.4f64..6.0, theta in 0.01f64..1.4, azimuth in -3.1f64..3.1,
                                x in -0.4f64..0.4, y in -0.3f64..0.3) {

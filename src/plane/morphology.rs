@@ -1,22 +1,22 @@
-//! Sets of lattice nodes: reached, grown, shrunk.
+//! Morphology of sets of lattice nodes.
 
 use super::grow::Lattice;
 use crate::stats::SummedArea;
 
-/// Gaps up to this many nodes are crossed: speckle holes, not the gap between two objects.
+/// Steps of the flood fill, nodes: it crosses speckle holes, but not the gap between two objects.
 const BRIDGE: usize = 2;
 /// Bands without any measurement are crossed up to this many nodes: 18 px on a 640 px image.
 const BAND: usize = 6;
 
 impl Lattice {
-    /// Nodes reached from `seeds` over `open` nodes.
+    /// Nodes connected to `seeds` over `open` nodes.
     pub fn reached(&self, open: &[bool], seeds: &[usize]) -> Vec<bool> {
         let mut mask = vec![false; open.len()];
         self.flood(&mut mask, open, seeds);
         mask
     }
 
-    /// Adds what is reached to the `mask`.
+    /// Adds the nodes reached to `mask`.
     fn flood(&self, mask: &mut [bool], open: &[bool], seeds: &[usize]) {
         let mut queue: Vec<usize> = Vec::new();
         for &seed in seeds {
@@ -35,7 +35,7 @@ impl Lattice {
         }
     }
 
-    /// The same, and over bands without a measurement.
+    /// As [`Lattice::reached`], also across bands without a measurement.
     pub fn reached_across_bands(&self, open: &[bool], seeds: &[usize]) -> Vec<bool> {
         let mut mask = self.reached(open, seeds);
         loop {
@@ -47,7 +47,7 @@ impl Lattice {
         }
     }
 
-    /// Open nodes that face the set ones over a band without a measurement: rows or columns that the sensor lost.
+    /// Open nodes opposite the set ones across unmeasured bands: rows or columns that the sensor lost.
     fn across_bands(&self, mask: &[bool], open: &[bool]) -> Vec<usize> {
         let inside = |c: isize, r: isize| {
             let node = r * self.columns as isize + c;
@@ -80,15 +80,15 @@ impl Lattice {
         (0..mask.len()).map(|n| around(n) > [0.0]).collect()
     }
 
-    /// Every node with a set node within one step.
+    /// Nodes with a set node within one step.
     pub fn dilated(&self, mask: &[bool]) -> Vec<bool> {
         (0..mask.len()).map(|n| self.around(n, 1).any(|m| mask[m])).collect()
     }
 
-    /// With gaps of up to two nodes closed, as far as the set itself surrounds them: where an edge
-    /// meets the image's border at a slant, what is outside the image closes nothing.
+    /// Closes gaps of up to two nodes that the set itself surrounds: where an edge meets the image's border
+    /// at a slant, the outside of the image closes nothing.
     pub fn closed(&self, mask: &[bool]) -> Vec<bool> {
-        // The image is widened by a node on every side, none of them set.
+        // The image is padded by an unset node on every side.
         let (across, rows) = (self.columns + 2, self.rows + 2);
         let mut near = vec![false; across * rows];
         for node in (0..mask.len()).filter(|n| mask[*n]) {
@@ -104,7 +104,7 @@ impl Lattice {
         (0..mask.len()).map(surrounded).collect()
     }
 
-    /// Every node whose neighbours inside the image are all set.
+    /// Nodes whose neighbours inside the image are all set.
     pub fn eroded(&self, mask: &[bool]) -> Vec<bool> {
         (0..mask.len()).map(|n| self.around(n, 1).all(|m| mask[m])).collect()
     }

@@ -1,4 +1,4 @@
-//! The paper's plane: three-point hypotheses on 3-D points, then total least squares.
+//! The paper's plane: RANSAC with three-point hypotheses on 3-D points, then total least squares.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rand::seq::index::sample;
@@ -30,28 +30,28 @@ impl Points {
 /// n . X = rho, n of unit length.
 type NormalForm = (Vector3<f64>, f64);
 
-/// The paper's plane and what it measures from the inliers.
+/// The paper's plane and the statistics of its inliers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RansacPlane {
     /// Total least squares over the inliers.
     pub plane: Plane,
     /// Mean depth of the inliers, m.
     pub z_m: f64,
-    /// Between the optical axis and the plane's normal, rad.
+    /// Angle between the optical axis and the plane's normal, rad.
     pub theta_rad: f64,
     /// Standard deviation of the inliers' point-to-plane distances, m.
     pub sigma_m: f64,
     pub inliers: usize,
 }
 
-/// Hypotheses are judged on this many points: the standard error of an inlier share is then
-/// below one percent, and the cost does not grow with the image.
+/// Hypotheses are judged on this many points: the standard error of an inlier share is then at most one
+/// percent, and the cost does not grow with the image.
 const JURY: usize = 2500;
 
-/// RANSAC, then total least squares on the inliers, twice, so that the inlier set belongs to the
-/// refitted plane (Yamaguchi et al. 2016, section II).
+/// Fits a plane by RANSAC and then twice by total least squares on the inliers, so that the inlier set
+/// belongs to the refitted plane (Yamaguchi et al. 2016, section II).
 ///
-/// `None` when the points hold no plane.
+/// `None` when the points contain no plane.
 pub fn ransac_plane(
     points: &Points,
     options: &RansacOptions,
@@ -84,7 +84,7 @@ pub fn ransac_plane(
 
 const REFITS: usize = 2;
 
-/// First and second moments of the inliers, taken about a point near them to keep digits.
+/// First and second moments of the inliers, about a point near them to keep precision.
 #[derive(Debug, Clone, Default)]
 struct Moments {
     n: f64,
@@ -93,8 +93,8 @@ struct Moments {
     second: [f64; 6],
 }
 
-/// Points summed in single precision before they join the double-precision total: long enough
-/// to use vector registers, short enough to lose nothing (256 terms of like size: 1e-5 relative).
+/// Points summed in single precision before they are added to the double-precision total: enough to use
+/// vector registers, few enough to lose nothing (256 terms of similar size: 1e-5 relative).
 const BLOCK: usize = 256;
 
 impl Moments {
@@ -159,13 +159,13 @@ impl Moments {
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) / self.n - m * m.transpose()
     }
 
-    /// Standard deviation along a direction; n - 3 because a plane was fitted.
+    /// Standard deviation along a direction, with n - 3 degrees of freedom because a plane was fitted.
     fn spread_along(&self, normal: &Vector3<f64>) -> f64 {
         let variance = normal.dot(&(self.covariance() * normal)).max(0.0);
         (variance * self.n / (self.n - 3.0).max(1.0)).sqrt()
     }
 
-    /// The plane through the centroid, its normal the direction of least spread.
+    /// The plane through the centroid whose normal is the direction of least variance.
     fn total_least_squares(&self) -> Option<NormalForm> {
         if self.n < 3.0 {
             return None;

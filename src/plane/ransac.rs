@@ -1,21 +1,21 @@
-//! RANSAC (Fischler and Bolles 1981) for what three data determine.
+//! RANSAC (Fischler and Bolles 1981) for models determined by three data.
 
 use rand::Rng;
 
 use crate::rng::Stream;
 
-/// When a search ends, and what lies on a plane.
+/// Inlier threshold and stopping criteria.
 #[derive(Debug, Clone, Copy)]
 pub struct RansacOptions {
-    /// Greatest distance of an inlier, in the data's unit; m for the paper's plane.
+    /// Largest distance of an inlier, in the data's unit; m for the paper's plane.
     pub threshold_m: f64,
     pub iterations: usize,
     pub confidence: f64,
 }
 
-/// The best of up to `iterations` hypotheses, each through three of `n` data, by its inliers among the
-/// `jury`; stops early once a better one is less likely than `1 - confidence`. `hypothesis` is `None` of
-/// a degenerate sample, `distance` that of a datum from a model, without a sign.
+/// Returns the best of up to `iterations` hypotheses, each through three of `n` data, by its inliers among
+/// the `jury`. Stops early once a better one is less likely than `1 - confidence`. `hypothesis` is `None` for
+/// a degenerate sample; `distance` is the unsigned distance of a datum from a model.
 pub fn ransac<M: Copy>(
     n: usize,
     options: &RansacOptions,
@@ -43,7 +43,7 @@ pub fn ransac<M: Copy>(
     best.map(|(model, _)| model)
 }
 
-/// Different indices below `n`, uniform.
+/// Three different indices below `n`, drawn uniformly.
 fn three_below(n: usize, rng: &mut Stream) -> [usize; 3] {
     let mut drawn = [0; 3];
     for slot in 0..3 {

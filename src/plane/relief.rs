@@ -1,6 +1,6 @@
-//! What is not the target's: what stands off its plane inside a region (a ball on the board, a hand),
-//! and other planes beside it. Where a wall crosses the target's plane, its pixels lie on both. Each
-//! alone fits; what decides is which plane explains their neighbourhood better.
+//! Finds what is not part of the target: relief off its plane inside a region (a ball on the board, a hand),
+//! and other planes next to it. Where a wall crosses the target's plane, pixels fit both; the plane that
+//! explains their neighbourhood better decides.
 
 use super::affine::AffineFit;
 use super::grow::{BEND_M, Gauge, Lattice};
@@ -10,15 +10,15 @@ use crate::rng::Stream;
 /// Connected areas off the plane.
 pub(super) struct Relief {
     pub lattice: Lattice,
-    /// Nodes of the areas and next to them.
+    /// Nodes in the areas and next to them.
     pub mask: Vec<bool>,
     pub notes: Vec<String>,
     /// Share of the measured nodes that the areas cover.
     pub share: f64,
 }
 
-/// Areas of the pixels `inside` whose neighbourhoods are off the plane by more than its noise
-/// and bend. Scattered gross errors and holes are the sensor's and are no relief.
+/// Finds areas of the pixels `inside` whose neighbourhoods are off the plane by more than its noise and bend.
+/// Scattered gross errors and holes belong to the sensor and are no relief.
 pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &AffineFit) -> Relief {
     let camera = image.camera;
     let mut w = vec![f32::NAN; image.w.len()];
@@ -40,7 +40,7 @@ pub(super) fn relief(image: &InverseDepthImage<'_>, inside: &[u32], fit: &Affine
             mask.iter_mut().zip(&area).for_each(|(mask, area)| *mask |= area);
         }
     }
-    // The slope from the plane up to the relief is below the noise for about a neighbourhood.
+    // The slope from the plane up to the relief is hidden in the noise over about a neighbourhood.
     let mask = lattice.dilated(&lattice.dilated(&mask));
     let measured = lattice.measured().filter(|m| *m).count();
     let covered = lattice.measured().zip(&mask).filter(|(measured, m)| *measured && **m).count();
@@ -76,15 +76,15 @@ fn describe(
     )
 }
 
-/// Rivals are looked for this many nodes around the target: a tenth of the image's width.
+/// Width of the ring around the target in which rivals are searched, nodes: a tenth of the image's width.
 const RING: usize = 20;
-/// Walls and floor, and one more.
+/// Rivals at most: walls and floor, and one more.
 const MAX_RIVALS: usize = 3;
-/// A plane that holds less of the ring than this is chance, or the target's own bend.
+/// Least share of the ring on a rival: less is chance, or the target's own bend.
 const MIN_SHARE: f64 = 0.2;
-/// Fewest nodes in which a plane is looked for: 20 x 20 px on a 640 px image.
+/// Fewest nodes in which a plane is searched: 20 x 20 px on a 640 px image.
 const MIN_NODES: usize = 45;
-/// A node belongs to a rival when it is this near to it, in robust standard deviations.
+/// Largest distance of a node from a rival it belongs to, robust standard deviations.
 const ON_RIVAL_SIGMAS: f64 = 3.0;
 
 /// Nodes that another plane around the target explains better than the target's own.
@@ -108,13 +108,13 @@ pub(super) fn rivals(
         let residuals = lattice.residuals(&Gauge { fit: &rival, bend_m: 0.0 });
         let before = count(&ring);
         for (node, r) in ring.iter_mut().zip(&residuals) {
-            // NaN is no measurement and not in the ring.
+            // NaN means no measurement, and is not in the ring.
             *node &= f64::from(r.abs()) > ON_RIVAL_SIGMAS;
         }
         if ((before - count(&ring)) as f64) < MIN_SHARE * size as f64 {
             break;
         }
-        // The same yardstick for both, or the noisier plane would win.
+        // The same scale for both, or the noisier plane would win.
         let theirs = neighbourhoods(lattice, &AffineFit { scale: fit.scale, ..rival });
         for ((bar, own), theirs) in barred.iter_mut().zip(&own).zip(&theirs) {
             *bar |= theirs < own;
@@ -123,13 +123,13 @@ pub(super) fn rivals(
     barred
 }
 
-/// Sum of squares about the plane around each node.
+/// Sum of squared residuals about the plane, around each node.
 fn neighbourhoods(lattice: &Lattice, fit: &AffineFit) -> Vec<f32> {
     let residuals = lattice.residuals(&Gauge { fit, bend_m: 0.0 });
     lattice.boxed(&residuals).iter().map(|sums| sums[2]).collect()
 }
 
-/// Measured nodes around the mask, not next to it.
+/// Measured nodes around the mask, but not next to it.
 fn ring(lattice: &Lattice, mask: &[bool]) -> Vec<bool> {
     let near = lattice.dilated(mask);
     lattice

@@ -1,5 +1,4 @@
-//! Which pixels are the target: those of a region, or else of the plane that the principal point
-//! looks at.
+//! Finds the target's pixels: those of a region, or else of the plane at the principal point.
 
 use super::affine::AffineFit;
 use super::border::beside;
@@ -14,7 +13,7 @@ use crate::rng::Stream;
 use crate::stats::median_in_place;
 use crate::view::Region;
 
-/// The plane in `region`, or else the one the principal point looks at; or why there is none.
+/// Finds the plane in `region`, or else the one at the principal point; or says why there is none.
 pub(super) fn target_in(
     image: &InverseDepthImage<'_>,
     region: Option<&Region>,
@@ -83,12 +82,12 @@ fn in_region(
     Ok(Target { pixels, plane: fit.plane, scale: fit.scale, exclusions, notes })
 }
 
-/// A region of which more than this share is off the plane was not drawn around a target.
+/// Largest share of a region off the plane; with more it was not drawn around a target.
 const MAX_RELIEF: f64 = 0.5;
-/// Residual over local noise above which a region is no plane: Herrera's 39 views reach 3.7.
+/// Largest ratio of residual to local noise for a plane: Herrera's 39 views reach 3.7.
 const MAX_BENT: f64 = 5.0;
 
-/// What stands off the plane in a region that is a plane otherwise.
+/// Finds the relief in a region that is otherwise a plane; or says why it is none.
 fn flat_enough(
     image: &InverseDepthImage<'_>,
     inside: &[u32],
@@ -111,11 +110,11 @@ fn flat_enough(
     Ok(relief)
 }
 
-/// Clutter below this share of a region is not worth a note.
+/// Least share of clutter in a region that is noted.
 const NOTED_OFF_PLANE: f64 = 0.02;
 
-/// Half sizes of the windows a seed is looked for in, as shares of the image width: from a board
-/// seen edge-on to one whose middle is hidden by a hand.
+/// Half sizes of the windows for a seed, as shares of the image width: from a board seen edge-on to one whose
+/// middle is hidden by a hand.
 const WINDOWS: [f64; 5] = [0.019, 0.031, 0.05, 0.08, 0.13];
 
 pub(super) fn at_principal_point(
@@ -161,8 +160,8 @@ pub(super) fn at_principal_point(
     finish(image, &lattice, &best, measured)
 }
 
-/// A plane that the principal point does not look at is the target only behind something small and
-/// not flat, such as a hand. A flat thing there is the board, and what was found is a wall.
+/// Accepts a plane away from the principal point only if something small and not flat, such as a hand, hides
+/// it there. A flat object there is the board, and the plane found is a wall.
 fn only_a_hand_between(
     image: &InverseDepthImage<'_>,
     best: &Candidate,
@@ -193,7 +192,7 @@ fn only_a_hand_between(
     Ok(())
 }
 
-/// Median inverse depth of the pixels above the candidate's plane, 1/m; `None` without any.
+/// Median of the pixels' inverse depth less that of the candidate's plane, 1/m; `None` without any.
 fn ahead(image: &InverseDepthImage<'_>, best: &Candidate, pixels: &[u32]) -> Option<f32> {
     let mut ahead: Vec<f32> = pixels
         .iter()
@@ -204,7 +203,7 @@ fn ahead(image: &InverseDepthImage<'_>, best: &Candidate, pixels: &[u32]) -> Opt
     (!ahead.is_empty()).then(|| median_in_place(&mut ahead))
 }
 
-/// Does most of what is around the principal point lie on one plane, by the candidate's noise?
+/// Whether most pixels around the principal point lie on one plane, by the candidate's noise.
 fn flat_there(image: &InverseDepthImage<'_>, best: &Candidate, rng: &mut Stream) -> bool {
     let half = WINDOWS[1] * image.camera.width as f64;
     let around: Vec<u32> = around_principal_point(image.camera, half)
@@ -220,21 +219,21 @@ fn flat_there(image: &InverseDepthImage<'_>, best: &Candidate, rng: &mut Stream)
     around.iter().filter(near).count() as f64 > FLAT_SHARE * around.len() as f64
 }
 
-/// A hand and a wrist reach no farther over the board than this, m.
+/// Largest extent of a hand and wrist over the board, m.
 const HAND_M: f64 = 0.15;
-/// Flat is what holds this share within so many sigma of a plane: 99 % of noise is.
+/// A surface is flat if this share is within so many sigma of a plane, as 99 % of noise is.
 const FLAT_SIGMAS: f64 = 2.5;
 const FLAT_SHARE: f64 = 0.8;
 
-/// The principal point looks at the plane when this share of what is measured there lies on it.
+/// The principal point looks at the plane when this share of the measured pixels there is on it.
 const AT_CENTRE: f64 = 0.5;
 
-/// Flat before not flat, a board before a palm, looked at before looked past, near before far.
+/// Rank of a candidate: by flatness, then size, then whether it is at the principal point, then nearness.
 fn rank(c: &Candidate) -> (bool, bool, bool, i64) {
     (c.flat, c.roomy, c.at_centre >= AT_CENTRE, -(c.away_px as i64))
 }
 
-/// Pixels of the grown region, less its edge, and what was left out.
+/// Pixels of the grown region without its edge, and the exclusions.
 fn finish(
     image: &InverseDepthImage<'_>,
     lattice: &Lattice,
@@ -268,7 +267,7 @@ fn finish(
             continue;
         }
         let fits = image.valid(i) && on_plane(image, &best.fit, i);
-        // Near the edge only what fits: something else may be seen there.
+        // Near the edge only pixels that fit: others may show something else.
         if !core[node] && !fits {
             continue;
         }

@@ -1,6 +1,6 @@
 //! An axis with round ticks, linear or logarithmic.
 
-/// From `low` to `high`, with the values that get a tick and a label.
+/// The range from `low` to `high`, with its labelled ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// The left or lower end.
@@ -9,29 +9,29 @@ pub struct Axis {
     pub high: f64,
     /// Logarithmic, not linear.
     pub log: bool,
-    /// Values with a tick and a label, rising.
+    /// Values with a tick and a label, ascending.
     pub ticks: Vec<f64>,
 }
 
-/// More labels than this crowd a figure.
+/// Most ticks of an axis; more crowd a figure.
 const MAX_TICKS: usize = 10;
-/// A logarithmic axis wants at least this many labels to be read.
+/// Fewest ticks that make a logarithmic axis readable.
 const MIN_LOG_TICKS: usize = 4;
-/// Share of the value by which an empty range is widened on either side.
+/// Share of the value by which an empty range is widened on each side.
 const WIDEN: f64 = 0.05;
-/// Mantissas of round numbers.
+/// Mantissas of ticks.
 const ROUND: [f64; 3] = [1.0, 2.0, 5.0];
-/// ... and more of them, evenly spread on a short logarithmic axis.
+/// Mantissas for a short logarithmic axis: more of them, evenly spread.
 const FINER: [f64; 6] = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0];
 
 impl Axis {
-    /// Ticks at multiples of 1, 2 or 5 times a power of ten.
+    /// Linear axis with ticks at multiples of 1, 2 or 5 times a power of ten.
     pub fn linear(low: f64, high: f64) -> Self {
         let [low, high] = widened(low, high);
         Axis { low, high, log: false, ticks: multiples(low, high) }
     }
 
-    /// Ticks at 1, 2 and 5 times powers of ten; both ends must be positive.
+    /// Logarithmic axis with ticks at 1, 2 and 5 times powers of ten; both ends must be positive.
     pub fn log(low: f64, high: f64) -> Self {
         let [low, high] = widened(low.max(f64::MIN_POSITIVE), high);
         let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
@@ -54,13 +54,13 @@ impl Axis {
         Axis { low, high, log: true, ticks }
     }
 
-    /// With `share` of the range to spare at either end, so that no mark touches the frame.
+    /// Linear axis with `share` of the range added at each end, so that no mark touches the frame.
     pub fn with_margin([low, high]: [f64; 2], share: f64) -> Self {
         let spare = share * (high - low);
         Axis::linear(low - spare, high + spare)
     }
 
-    /// With half the ticks where there are many, for a small chart.
+    /// Drops every other tick where there are many, for a small chart.
     pub fn sparse(mut self) -> Self {
         if self.ticks.len() > MAX_TICKS / 2 + 1 {
             let step = self.ticks[1] - self.ticks[0];
@@ -69,13 +69,13 @@ impl Axis {
         self
     }
 
-    /// Without the ticks below `value`.
+    /// Drops the ticks below `value`.
     pub fn ticks_from(mut self, value: f64) -> Self {
         self.ticks.retain(|t| *t >= value);
         self
     }
 
-    /// Where `value` lies, 0 at the low end and 1 at the high one.
+    /// Position of `value`: 0 at the low end, 1 at the high end.
     pub fn share(&self, value: f64) -> f64 {
         if self.log {
             (value / self.low).ln() / (self.high / self.low).ln()
@@ -84,19 +84,19 @@ impl Axis {
         }
     }
 
-    /// Does `value` lie on the axis?
+    /// Whether `value` lies on the axis.
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
-    /// Ticks are round numbers: no more digits than they need.
+    /// Label of a tick, without needless digits.
     pub fn label(value: f64) -> String {
         const DIGITS: f64 = 1e9;
         format!("{}", (value * DIGITS).round() / DIGITS + 0.0).replace('-', "−")
     }
 }
 
-/// The least of 1, 2, 5 times a power of ten that is not below `value`.
+/// Smallest of 1, 2 or 5 times a power of ten that is not below `value`.
 pub(super) fn round_up(value: f64) -> f64 {
     const ROUNDING: f64 = 1e-9;
     let decade = 10f64.powf(value.log10().floor());

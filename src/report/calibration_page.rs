@@ -1,4 +1,4 @@
-//! The page of a calibration.
+//! The calibration page.
 
 mod tiles;
 mod uncertainty;
@@ -21,24 +21,24 @@ use crate::model::{DISTANCE_RATIO, Direction, HeldOut, Parameter, Provenance, Si
 use crate::units::counted;
 use crate::view::Sensor;
 
-/// What the page is about; a bare table has neither sensor nor measurements.
+/// Contents of the page. A bare table has neither sensor nor measurements.
 #[derive(Debug, Clone, Copy)]
 pub struct CalibrationPage<'a> {
-    /// Of the page.
+    /// Title of the page.
     pub title: &'a str,
-    /// The unit, when a recording was measured.
+    /// The sensor, if a recording was measured.
     pub sensor: Option<&'a Sensor>,
-    /// Its views.
+    /// The measured views, if a recording was measured.
     pub measurements: Option<&'a Measurements>,
-    /// The model with all that belongs to it.
+    /// The model with its fit, table and warnings.
     pub calibration: &'a Calibration,
-    /// Drawn into Fig. 2.
+    /// Published surfaces drawn into Fig. 2.
     pub overlays: &'a [Overlay],
     pub origin: &'a Origin,
 }
 
 impl CalibrationPage<'_> {
-    /// Of the views, by number.
+    /// Names of the views, in order.
     pub fn names(&self) -> Vec<&str> {
         let views = self.measurements.map_or(&[][..], |m| &m.views);
         views.iter().map(|view| view.name.as_str()).collect()
@@ -58,7 +58,7 @@ const FIGURE2: &str = "The same against tilt, as in the paper's Fig. 2: colour a
 const RESIDUALS: &str = "Measured σ minus the fit, in percent of the fit, with one standard error \
     from the number of independent samples. What bends here is not in the form.";
 
-/// The page as text.
+/// Renders the page as HTML text.
 pub fn calibration_page(page: &CalibrationPage<'_>) -> Result<String> {
     let (calibration, names) = (page.calibration, page.names());
     let (measured, sigma) = (&calibration.table, &calibration.model.sigma);
@@ -113,7 +113,7 @@ fn header(page: &CalibrationPage<'_>) -> Markup {
     }
 }
 
-/// Does the surface describe what was measured?
+/// States whether the surface describes what was measured.
 fn verdict(page: &CalibrationPage<'_>) -> Markup {
     let calibration = page.calibration;
     let quality = &calibration.fit.quality;
@@ -137,7 +137,7 @@ fn verdict(page: &CalibrationPage<'_>) -> Markup {
     answer(if warnings == 0 { "good" } else { "unsure" }, "Calibrated", &sentence, &more)
 }
 
-/// The form with its parameters put in, for the eye and for a program.
+/// The form with its parameters inserted, typeset and as a line of code to copy.
 fn formula_to_copy(model: &SigmaModel) -> Markup {
     let card = model.form.card();
     let (equation, units) = card.formula.split_once(" (m").unwrap_or((card.formula, ""));
@@ -179,11 +179,11 @@ fn result(page: &CalibrationPage<'_>) -> Markup {
     ])
 }
 
-/// Where sensors are compared, m.
+/// Distances at which sensors are compared, m.
 const COMPARED_AT_M: [f64; 3] = [1.0, 2.0, 3.0];
 const LEVEL: f64 = 0.95;
 
-/// The sensor beside the published surfaces, at the ends of its range and the usual distances.
+/// Table of the sensor beside the published surfaces, at the ends of its range and the usual distances.
 fn published(model: &SigmaModel) -> Markup {
     let mut distances: Vec<f64> = COMPARED_AT_M.into_iter().chain(model.domain.z_m).collect();
     distances.sort_by(f64::total_cmp);
@@ -206,7 +206,7 @@ fn published(model: &SigmaModel) -> Markup {
     }
 }
 
-/// With its interval where it has one; nothing where the source measured no such view.
+/// Sigma with its interval, if there is one; a dash where the source measured no such view.
 fn sigma_at(model: &SigmaModel, z: f64, theta: f64, own: bool) -> Markup {
     let ([near, far], [low, high]) = (model.domain.z_m, model.domain.theta_rad);
     if z * DISTANCE_RATIO < near || z > far * DISTANCE_RATIO || theta < low || theta > high {
@@ -258,7 +258,7 @@ fn model(page: &CalibrationPage<'_>) -> Markup {
     section("Model", &content)
 }
 
-/// What it takes to make the model again, beside the page's origin.
+/// What is needed to make the model again, beside the page's origin.
 fn made(made: &Provenance) -> Vec<(String, Markup)> {
     let text = |value: &Value| match value {
         Value::Null => "automatic".into(),

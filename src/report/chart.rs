@@ -7,66 +7,66 @@ use plotters::style::{RGBAColor, RGBColor};
 
 use super::axis::Axis;
 
-/// Everything that a chart shows. Values outside the axes are not drawn.
+/// Everything a chart shows. Values outside the axes are not drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// Empty where the page around it says it.
+    /// Empty where the surrounding page gives the title.
     pub title: String,
     /// Width and height, px of the SVG.
     pub size: (u32, u32),
     pub x: Axis,
     pub y: Axis,
-    /// What `x` and `y` are, with their units.
+    /// Labels of `x` and `y`, with their units.
     pub labels: [String; 2],
     pub grid: bool,
     /// Drawn in this order.
     pub layers: Vec<Layer>,
-    /// What a colour means, where it stands for a number: above the legend.
+    /// Colour scale, drawn above the legend, for colours that stand for a number.
     pub scale: Option<ColourScale>,
     /// To the right of the axes; below them where the chart is narrow.
     pub legend: Vec<Entry>,
-    /// What a reader who points at a place of the SVG is told.
+    /// Places in the SVG and the text shown when a reader points at them.
     pub tips: Vec<([f64; 2], String)>,
 }
 
-/// Things of one kind, in the units of the axes.
+/// Elements of one kind, in the units of the axes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Layer {
-    /// Straight from point to point; a lone point becomes a short stroke.
+    /// Straight segments from point to point; a single point becomes a short stroke.
     Line(Vec<[f64; 2]>, Stroke),
-    /// x, lower and upper end: the area between; ends are clamped to the axis.
+    /// Area between the lower and the upper end at each x; ends are clamped to the axis.
     Band(Vec<[f64; 3]>, RGBAColor),
-    /// x, lower and upper end; ends are clamped to the axis.
+    /// x, lower end and upper end; ends are clamped to the axis.
     ErrorBars(Vec<[f64; 3]>, Stroke),
     Marks(Vec<[f64; 2]>, Mark),
-    /// From and to in x, from and to in y: a tile of a heat map, or a histogram's bar.
+    /// Range in x and range in y: a tile of a heat map or a bar of a histogram.
     Tile([f64; 2], [f64; 2], RGBAColor),
-    /// Over all that the axes span: what later layers do not cover was not measured.
+    /// Hatches the whole plot area; what later layers leave uncovered was not measured.
     Hatching,
-    /// On a white ground.
+    /// Text on a white background.
     Label([f64; 2], String),
 }
 
-/// How a line looks.
+/// Style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke {
     pub colour: RGBAColor,
     pub width: u32,
-    /// Lengths of stroke and gap; none for a whole line.
+    /// Lengths of dash and gap; `None` for a solid line.
     pub dashes: Option<[i32; 2]>,
 }
 
-/// How a point looks.
+/// Style of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mark {
-    /// Told apart without colour: 0 is a disc, 1 to 6 have corners, then they repeat.
+    /// Shape, distinguishable without colour: 0 is a disc, 1 to 6 have corners, then these repeat.
     pub shape: usize,
     pub radius: i32,
     pub fill: RGBAColor,
     pub edge: RGBAColor,
 }
 
-/// What a sample in the legend looks like.
+/// A sample in the legend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sample {
     Line(Stroke),
@@ -75,14 +75,14 @@ pub enum Sample {
     Hatching,
 }
 
-/// A row of the legend: samples over one another, then words. Without samples it is a remark.
+/// A row of the legend: superimposed samples, then text. Without samples it is a remark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
     pub samples: Vec<Sample>,
     pub text: String,
 }
 
-/// Equal steps of colour from the low end of an axis to its high one.
+/// Equal steps of colour from the low to the high end of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourScale {
     pub title: String,
@@ -90,14 +90,14 @@ pub struct ColourScale {
     pub colours: Vec<RGBColor>,
 }
 
-/// Of most charts: as wide as a page.
+/// Size of most charts: as wide as a page.
 const SIZE: (u32, u32) = (960, 540);
-/// Of one of two beside each other.
+/// Size of one of two charts side by side.
 const SMALL_SIZE: (u32, u32) = (470, 300);
 
-/// Of one on a telephone, without its legend.
+/// Size of a chart on a phone, without its legend.
 const NARROW_SIZE: (u32, u32) = (400, 320);
-/// From one row of the legend to the next.
+/// Spacing of legend rows.
 const ROW: f64 = 25.0;
 /// Height of a colour scale below the axes, rows of the legend.
 const SCALE_ROWS: usize = 6;
@@ -107,29 +107,29 @@ const LEFT: f64 = 12.0;
 const RIGHT: f64 = 20.0;
 const FOOT: f64 = 8.0;
 const TITLE_ROOM: f64 = 40.0;
-/// Above the axes, for the label of y.
+/// Room above the axes for the label of y.
 const LABEL_ROOM: f64 = 30.0;
 const X_TICKS: f64 = 48.0;
 const Y_TICKS: f64 = 54.0;
-/// Column to the right.
+/// Width of the column to the right.
 const LEGEND: f64 = 225.0;
 
 impl Chart {
-    /// As wide as a page, with a grid; layers and legend are still to be added.
+    /// A chart as wide as a page, with a grid; layers and legend are added later.
     pub fn new(title: &str, [x, y]: [Axis; 2], labels: [&str; 2]) -> Self {
         let (title, labels) = (title.into(), labels.map(str::to_string));
         let (layers, scale, legend, tips) = (Vec::new(), None, Vec::new(), Vec::new());
         Chart { title, size: SIZE, x, y, labels, grid: true, layers, scale, legend, tips }
     }
 
-    /// Half as wide, without a title.
+    /// A chart half as wide, without a title.
     pub fn small([x, y]: [Axis; 2], labels: [&str; 2]) -> Self {
         let axes = [x.sparse(), y.sparse()];
         Chart { size: SMALL_SIZE, ..Chart::new("", axes, labels) }
     }
 
-    /// The same for a telephone, or for half a page: fewer ticks, the legend below. `None` where the
-    /// chart is narrow already.
+    /// The same chart for a phone or for half a page, with fewer ticks and the legend below. `None` if the
+    /// chart is already narrow.
     pub fn narrow(&self) -> Option<Self> {
         if self.size.0 <= SMALL_SIZE.0 {
             return None;
@@ -141,13 +141,12 @@ impl Chart {
         Some(Chart { size, x: sparse(&self.x), y: sparse(&self.y), ..self.clone() })
     }
 
-    /// Has it its legend below the axes?
+    /// Whether the legend is below the axes.
     fn is_narrow(&self) -> bool {
         self.size.0 == NARROW_SIZE.0
     }
 
-    /// Widens one of two ranges so that a unit is as long in x as in y on a chart as wide as a
-    /// page with a legend.
+    /// Widens one of two ranges so that a unit is as long in x as in y, on a page-wide chart with a legend.
     pub fn equal_units(ranges: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         let across = f64::from(SIZE.0) - LEFT - Y_TICKS - LEGEND;
         let down = f64::from(SIZE.1) - TITLE_ROOM - LABEL_ROOM - X_TICKS - FOOT;
@@ -172,7 +171,7 @@ impl Stroke {
 }
 
 impl Mark {
-    /// A disc without an edge of another colour.
+    /// A disc whose edge has the fill colour.
     pub fn dot(colour: impl Into<RGBAColor>, radius: i32) -> Self {
         let colour = colour.into();
         Mark { shape: 0, radius, fill: colour, edge: colour }

@@ -1,44 +1,44 @@
-//! Colours that keep their order in print without colour.
+//! Colours that keep their order when printed in greyscale.
 
 use plotters::style::RGBColor;
 
 pub(super) const INK: RGBColor = RGBColor(33, 33, 33);
 pub(super) const FAINT: RGBColor = RGBColor(110, 110, 110);
 pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
-/// The pages' accent.
+/// The pages' accent colour.
 pub(super) const ACCENT: RGBColor = RGBColor(0x1d, 0x91, 0xc0);
 
-/// Of distances, dark is near: viridis (van der Walt and Smith 2015) up to the green that still shows on white.
+/// Distances, dark is near: viridis (van der Walt and Smith 2015) up to the green that still shows on white.
 pub(super) const DISTANCES: [u32; 6] = [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xbed628];
-/// Of sigma on the map, light is small: ColorBrewer's YlGnBu up to the blue on which black still shows.
+/// Sigma on the map, light is small: ColorBrewer's YlGnBu up to the blue on which black still shows.
 pub(super) const SURFACE: [u32; 6] = [0xffffd9, 0xedf8b1, 0xc7e9b4, 0x7fcdbb, 0x41b6c4, 0x1d91c0];
-/// White is zero: ColorBrewer's RdBu, reversed, blue nearer than the plane, red farther.
+/// Residuals, white is zero: ColorBrewer's RdBu, reversed, blue nearer than the plane, red farther.
 pub(super) const RESIDUALS: [u32; 5] = [0x054a96, 0x67a9d6, 0xffffff, 0xef8a62, 0xa50f21];
-/// ColorBrewer's Dark2 and two of Set1: told apart by colour-blind eyes, four at least in print.
+/// ColorBrewer's Dark2 and two of Set1: distinguishable by colour-blind readers, at least four also in print.
 const LINES: [u32; 8] =
     [0xd95f02, 0x7570b3, 0xe6ab02, 0x1b9e77, 0xe7298a, 0x377eb8, 0x66a61e, 0xa6761d];
 
-/// Of the `i`-th of several lines without an order.
+/// Colour of the `i`-th of several lines without an order.
 pub(super) fn line(i: usize) -> RGBColor {
     rgb(LINES[i % LINES.len()])
 }
 
-/// The same hue for a thin line: at full lightness the last of the distances' colours is lost on
+/// The same hue, darkened for a thin line: at full lightness the last of the distances' colours is lost on
 /// white.
 pub(super) fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
-    /// At which even the lightest keeps a contrast of 4.5 to white (WCAG 2.1, 1.4.3).
+    /// Factor at which even the lightest colour keeps a contrast of 4.5 to white (WCAG 2.1, 1.4.3).
     const DARKER: f64 = 0.58;
     let dim = |c: u8| (f64::from(c) * DARKER).round() as u8;
     RGBColor(dim(r), dim(g), dim(b))
 }
 
-/// Red, green and blue, a byte each.
+/// Splits `0xrrggbb` into its bytes.
 fn rgb(colour: u32) -> RGBColor {
     let [_, r, g, b] = colour.to_be_bytes();
     RGBColor(r, g, b)
 }
 
-/// Linear between the anchors, which are evenly spread over a `share` of 0 to 1.
+/// Interpolates linearly between evenly spaced anchors; `share` runs from 0 to 1.
 pub(super) fn between(anchors: &[u32], share: f64) -> RGBColor {
     let last = anchors.len() - 1;
     let at = share.clamp(0.0, 1.0) * last as f64;

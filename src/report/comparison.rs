@@ -1,4 +1,4 @@
-//! Figures 6 to 8 and the page of a comparison.
+//! Figures 6 to 8 and the page of a comparison of mapping variants.
 
 use maud::{Markup, html};
 use nalgebra::Vector3;
@@ -12,7 +12,7 @@ use crate::compare::{Comparison, Row, Run, tables};
 use crate::error::Result;
 use crate::trajectory::Pose;
 
-/// The page: tables and figures, one self-contained file.
+/// Renders the page, one self-contained file with tables and figures.
 pub fn comparison_page(comparison: &Comparison, origin: &Origin) -> Result<String> {
     let [paths, over_time @ ..] = comparison_charts(comparison).map(|(_, chart)| chart);
     let title = format!("Mapping {}, variant by variant", comparison.sequence);
@@ -56,7 +56,7 @@ pub fn comparison_charts(comparison: &Comparison) -> [(&'static str, Chart); 3] 
     ]
 }
 
-/// The variants that are drawn, each in its colour: the paper's, and the last way past it.
+/// Lines of the drawn variants, each in its colour: the paper's, then the default.
 fn lines(comparison: &Comparison, points: impl Fn(&Run) -> Vec<[f64; 2]>) -> Vec<Line> {
     let line = |(i, (row, run)): (usize, (&Row, &Run))| {
         (row.variant.name.into(), points(run), Stroke::new(colours::line(i), 2))

@@ -1,13 +1,13 @@
-//! Where (z, tilt) was measured: a curve or a colour elsewhere would be a guess.
+//! Where (z, tilt) was measured; a curve or a colour elsewhere would be a guess.
 
 use crate::measure::SigmaRow;
 
-/// As far as one step of the paper's grid (0.5 m from 1 m on, and 10 degrees), a measured cell
-/// stands for its neighbourhood.
+/// A measured cell covers its neighbourhood up to one step of the paper's grid: 0.5 m from 1 m on, and 10
+/// degrees.
 const STEP_RATIO: f64 = 1.5;
 const STEP_RAD: f64 = 0.174_532_925_199_432_95;
 
-/// Is there a measured cell near?
+/// Whether a measured cell is near.
 pub(super) fn is_measured(rows: &[SigmaRow], z_m: f64, theta_rad: f64) -> bool {
     rows.iter().any(|row| {
         let along = (z_m / row.z_m).ln() / STEP_RATIO.ln();

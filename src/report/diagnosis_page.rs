@@ -1,4 +1,4 @@
-//! The page of a diagnosis: the answer and its pictures on the first screen, the evidence below.
+//! The diagnosis page: the answer and its pictures on the first screen, the evidence below.
 
 mod cards;
 mod curve;
@@ -22,20 +22,20 @@ use crate::diagnose::{Diagnosis, Finding, Reference, Status, ViewPictures};
 use crate::error::Result;
 use crate::units::counted;
 
-/// What the page is about.
+/// Contents of the page.
 #[derive(Debug, Clone, Copy)]
 pub struct DiagnosisPage<'a> {
-    /// Of the page.
+    /// Title of the page.
     pub title: &'a str,
     pub diagnosis: &'a Diagnosis,
-    /// Views whose residuals are worth seeing; few, they are large.
+    /// Views whose residuals are worth seeing; few, because they are large.
     pub pictures: &'a [ViewPictures],
-    /// The one to begin with first.
+    /// Recommended commands, the first to run first.
     pub steps: &'a [Step],
     pub origin: &'a Origin,
 }
 
-/// The page as text: one self-contained file.
+/// Renders the page as HTML text, one self-contained file.
 pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
     let diagnosis = page.diagnosis;
     let (main, minor) = by_size(&diagnosis.findings);
@@ -71,7 +71,7 @@ pub fn diagnosis_page(page: &DiagnosisPage<'_>) -> Result<String> {
     Ok(document(page.title, page.origin, &[], &body).into_string())
 }
 
-/// The findings that matter and those that do not, the largest in mm first, what cannot be seen last.
+/// The major and the minor findings, each sorted by size in mm, those that cannot be identified last.
 fn by_size(findings: &[Finding]) -> (Vec<&Finding>, Vec<&Finding>) {
     let mut sorted: Vec<&Finding> = findings.iter().collect();
     let mm = |f: &Finding| if f.size.mm.is_finite() { f.size.mm.abs() } else { 0.0 };
@@ -134,7 +134,7 @@ fn before_after(picture: &ViewPictures, diagnosis: &Diagnosis) -> Result<Markup>
     })
 }
 
-/// Root mean square of the pixels that there are.
+/// Root mean square of the finite pixels.
 fn rms(values: impl Iterator<Item = f32>) -> f64 {
     let finite = values.filter(|v| v.is_finite()).map(f64::from);
     let (square, n) = finite.fold((0.0, 0.0), |(sum, n), v| (sum + v * v, n + 1.0));

@@ -1,6 +1,6 @@
-//! The skeleton of a page: one self-contained HTML document, and the parts that all pages are made of.
+//! The skeleton of a page, one self-contained HTML document, and the building blocks shared by all pages.
 //!
-//! A page reaches for nothing outside itself, and says so to the browser, which would refuse it.
+//! A page loads nothing from outside; its content security policy makes the browser enforce that.
 
 use std::time::SystemTime;
 
@@ -11,28 +11,28 @@ use super::chart::Chart;
 use crate::error::Result;
 use crate::model::Provenance;
 
-/// How all pages look.
+/// Style sheet of all pages.
 const STYLE: &str = include_str!("page.css");
-/// Sorts tables, shows what a point is, enlarges pictures; a page can be read without it.
+/// Sorts tables, shows tips, enlarges pictures. A page is readable without it.
 const SCRIPT: &str = include_str!("page.js");
-/// What a page may load: nothing but what it carries.
+/// Content security policy: a page may load only what it carries.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
     img-src data:; base-uri 'none'; form-action 'none'";
 
-/// What it takes to make a page again.
+/// What is needed to make a page again.
 #[derive(Debug, Clone, Default)]
 pub struct Origin {
-    /// What was read, as it was given.
+    /// The recording as it was given.
     pub recording: String,
-    /// What was typed, without what results do not depend on.
+    /// The command line, without options that do not affect results.
     pub command: String,
     pub seed: Option<u64>,
-    /// RFC 3339, UTC.
+    /// Creation time, RFC 3339, UTC.
     pub created: String,
 }
 
 impl Origin {
-    /// Now where no time is given.
+    /// Origin with the given creation time, or the current time for `None`.
     pub fn at(recording: &str, command: &str, seed: Option<u64>, time: Option<SystemTime>) -> Self {
         let made = Provenance::at(seed, time.unwrap_or_else(SystemTime::now));
         let [recording, command] = [recording, command].map(String::from);
@@ -40,7 +40,7 @@ impl Origin {
     }
 }
 
-/// The whole document; the origin is its last section, and `more` belongs to it.
+/// Assembles the whole document. The origin is its last section; `more` adds rows to it.
 pub fn document(title: &str, origin: &Origin, more: &[(String, Markup)], body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -75,12 +75,12 @@ fn footer(origin: &Origin, more: &[(String, Markup)]) -> Markup {
     html! { footer { (section("How this page was made", &facts(all))) } }
 }
 
-/// A part of a page under a heading that can be linked.
+/// A section of a page under a linkable heading.
 pub fn section(title: &str, content: &Markup) -> Markup {
     html! { section { (heading(2, title)) (content) } }
 }
 
-/// A heading with an id of its words, and a link to itself.
+/// A heading with an id made from its words and a link to itself.
 pub fn heading(level: u8, title: &str) -> Markup {
     let id = slug(title);
     let inner =
@@ -88,25 +88,25 @@ pub fn heading(level: u8, title: &str) -> Markup {
     html! { @if level == 2 { h2 id=(id) { (inner) } } @else { h3 id=(id) { (inner) } } }
 }
 
-/// Letters and digits in lower case, with hyphens between words.
+/// The title's words in lower case, joined by hyphens.
 pub(super) fn slug(title: &str) -> String {
     let words = title.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_lowercase).collect::<Vec<_>>().join("-")
 }
 
-/// Numbers that stand for all: what, the number, a remark.
+/// The key numbers of a page: label, number, remark.
 pub fn tiles<'a>(tiles: impl IntoIterator<Item = (&'a str, String, String)>) -> Markup {
     html! { div.tiles { @for (what, value, remark) in tiles {
         div { p.label { (what) } p.big { (value) } p.label { (remark) } }
     } } }
 }
 
-/// The answer, before everything else: its class gives the tone, `good`, `bad` or `unsure`.
+/// The page's answer, shown first. `class` sets its tone: `good`, `bad` or `unsure`.
 pub fn answer(class: &str, mark: &str, sentence: &str, more: &Markup) -> Markup {
     html! { section.answer.(class) { p.mark { (mark) } p.sentence { (sentence) } (more) } }
 }
 
-/// A sentence whose `commands` stand between backticks and whose squares are `z^2`.
+/// A sentence with `commands` between backticks and squares written as `z^2`.
 pub fn prose(text: &str) -> Markup {
     let text = text.replace("^2", "²");
     html! { @for (i, part) in text.split('`').enumerate() {
@@ -114,20 +114,20 @@ pub fn prose(text: &str) -> Markup {
     } }
 }
 
-/// The cells of a row, each anything that maud can render.
+/// The cells of a table row; each cell is anything that maud can render.
 macro_rules! row {
     ($($cell:expr),* $(,)?) => { vec![$(maud::html! { ($cell) }),*] };
 }
 pub(super) use row;
 
-/// So many columns stand under one another on a phone; a table of more is one to scroll and compare.
+/// Most columns of a table whose cells stack on a phone; wider tables scroll, so that rows stay comparable.
 const MAX_STACKED: usize = 8;
 
-/// A table by the titles of its columns. Where the page is too narrow, the cells of a row stand under
-/// its name, each with its title; tables of many columns, or of three, scroll by themselves.
+/// A table with the given column titles. Where the page is too narrow, the cells of a row stack under
+/// its name, each with its title; tables of up to three or of many columns scroll instead.
 ///
-/// The first column names the row. A title after `>` is that of a column of numbers, set to the
-/// right; one after `~` is that of a column of sentences, set small.
+/// The first column names the row. A title prefixed with `>` marks a column of numbers, aligned right;
+/// `~` marks a column of sentences, set small.
 pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Markup>>) -> Markup {
     let columns: Vec<(Option<&str>, &str)> = columns.iter().map(|c| set(c.as_ref())).collect();
     let class = match columns.len() {
@@ -147,17 +147,17 @@ pub fn table<C: AsRef<str>>(columns: &[C], rows: impl IntoIterator<Item = Vec<Ma
     }
 }
 
-/// A column's title, as of [`table`], and its cell in a row.
+/// A column's title, as in [`table`], and its cell for a given row.
 pub(super) type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> Markup);
 
-/// A table with a row for each of some things.
+/// A table with one row per item.
 pub(super) fn table_of<T>(columns: &[Column<'_, T>], things: &[T]) -> Markup {
     let titles: Vec<&str> = columns.iter().map(|(title, _)| *title).collect();
     let cells = |thing| columns.iter().map(|(_, cell)| cell(thing)).collect();
     table(&titles, things.iter().map(cells))
 }
 
-/// Class and title of a column.
+/// CSS class and title of a column.
 fn set(column: &str) -> (Option<&'static str>, &str) {
     match (column.strip_prefix('>'), column.strip_prefix('~')) {
         (Some(title), _) => (Some("n"), title),
@@ -166,26 +166,26 @@ fn set(column: &str) -> (Option<&'static str>, &str) {
     }
 }
 
-/// Names and what they are.
+/// A definition list of names and values.
 pub fn facts<N: AsRef<str>>(facts: impl IntoIterator<Item = (N, Markup)>) -> Markup {
     html! {
         dl { @for (name, value) in facts { div { dt { (name.as_ref()) } dd { (value) } } } }
     }
 }
 
-/// A list; nothing where there are no items.
+/// A list; nothing if there are no items.
 pub(super) fn list(items: impl IntoIterator<Item = Markup>) -> Markup {
     let mut items = items.into_iter().peekable();
     html! { @if items.peek().is_some() { ul { @for item in items { li { (item) } } } } }
 }
 
-/// What opens on a click; open from the start where it is short.
+/// A section that opens on a click, or is `open` from the start.
 pub fn fold(title: &str, open: bool, content: &Markup) -> Markup {
     html! { details open[open] { summary { (title) } (content) } }
 }
 
-/// A chart with its caption (none where its title says it), wide and narrow: the style shows the one
-/// that fits.
+/// A chart with its caption, or without one where the title already says it. It is drawn wide and narrow;
+/// the style sheet shows the one that fits.
 pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
     let label = if chart.title.is_empty() { caption } else { &chart.title };
     let caption = (caption != label || chart.title.is_empty()).then_some(caption);
@@ -193,7 +193,7 @@ pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
     Ok(html! { figure { (drawing) @if let Some(words) = caption { figcaption { (words) } } } })
 }
 
-/// Charts with their titles, beside each other where there is room.
+/// Charts with their titles, side by side where there is room.
 pub(super) fn beside(charts: &[Chart]) -> Result<Markup> {
     let figures = charts.iter().map(|chart| figure(chart, &chart.title));
     let figures = figures.collect::<Result<Vec<Markup>>>()?;
@@ -212,7 +212,7 @@ pub(super) fn drawing(chart: &Chart, label: &str) -> Result<Markup> {
     })
 }
 
-/// An `img` that carries its pixels and is shown large on a click.
+/// An `img` with embedded pixels, enlarged on a click.
 pub(super) fn picture(png: &[u8], [width, height]: [usize; 2], alt: &str) -> Markup {
     let source = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png));
     html! { button.zoom type="button" title="enlarge" {

@@ -1,4 +1,4 @@
-//! The map to look at from all sides: surfels and path drawn by WebGL, and how far off the path is.
+//! The interactive map page: surfels and path drawn by WebGL, and the errors of the path.
 
 mod scene;
 
@@ -11,24 +11,24 @@ use crate::error::Result;
 use crate::map::{FrameReport, MapPoint};
 use crate::stats::{quantile, range};
 
-/// Twelve bytes each: more make the page heavy and the map no clearer.
+/// Most points drawn, 13 bytes each; more make the page heavy and the map no clearer.
 const MAX_POINTS: usize = 500_000;
 const SCRIPT: &str = include_str!("map_page.js");
 
-/// What the page is about.
+/// Contents of the page.
 #[derive(Debug, Clone, Copy)]
 pub struct MapPage<'a> {
     pub title: &'a str,
     pub points: &'a [MapPoint],
     pub frames: &'a [FrameReport],
-    /// Where the sequence has true poses.
+    /// Comparison with the true poses, if the sequence has them.
     pub against: Option<Against<'a>>,
-    /// Whose sigma weighs the points.
+    /// Name of the model whose sigma weighs the points.
     pub model: &'a str,
     pub origin: &'a Origin,
 }
 
-/// The page as text.
+/// Renders the page as HTML text.
 pub fn map_page(page: &MapPage<'_>) -> Result<String> {
     let stride = page.points.len().div_ceil(MAX_POINTS).max(1);
     let finite = |p: &&MapPoint| p.at.iter().all(|v| v.is_finite());

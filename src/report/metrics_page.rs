@@ -1,4 +1,4 @@
-//! The vendors' figures: by distance, by view, and how they differ from kinoise's own.
+//! The vendors' metrics by distance and by view, and how they differ from kinoise's own.
 
 use maud::{Markup, html};
 
@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::metrics::{AtDistance, Metrics, ViewMetrics};
 use crate::report::chart::Stroke;
 
-/// The page as text.
+/// Renders the page as HTML text.
 pub fn metrics_page(title: &str, metrics: &Metrics, origin: &Origin) -> Result<String> {
     let body = html! {
         h1 { (title) }
@@ -49,7 +49,7 @@ fn optional(text: Option<String>) -> Markup {
     html! { (text.as_deref().unwrap_or(ABSENT)) }
 }
 
-/// Shares of a percent need decimals.
+/// A percentage with decimals, for small shares.
 fn fine(share: f64) -> String {
     format!("{} %", fixed(1e2 * share, 3))
 }

@@ -1,9 +1,8 @@
-//! Drawing and pages. Computes nothing: a number in a report exists as data elsewhere.
+//! Charts and HTML pages. Nothing is computed here: every number in a report also exists as data elsewhere.
 //!
-//! A figure is a [`Chart`] first (what stands where, with which label), drawn second, by one set
-//! of functions for SVG and PNG alike. A page puts charts, tables and sentences into the skeleton
-//! of [`document`]; `numbers` decides how a number is written. The one error of a page, a figure or a
-//! chart is that a picture cannot be drawn.
+//! A figure is first a [`Chart`] (what stands where, with which label). One set of functions then draws
+//! it as SVG or PNG. A page puts charts, tables and sentences into the skeleton of [`document`];
+//! `numbers` formats the numbers. A page, figure or chart fails only if a picture cannot be drawn.
 
 mod axis;
 mod calibration_page;

@@ -1,15 +1,15 @@
-//! Numbers as people read them, with Unicode's minus and powers of ten.
+//! Formats numbers for readers, with Unicode's minus and powers of ten.
 
 use maud::{Markup, html};
 
 pub(super) const MM: f64 = 1e3;
 pub(super) const ABSENT: &str = "–";
-/// Beyond these, powers of ten are easier to read.
+/// Range written without a power of ten.
 const PLAIN: std::ops::Range<f64> = 1e-3..1e5;
-/// A p-value below it is not given to the digit.
+/// p-values below this are given as a bound.
 const MIN_P: f64 = 1e-6;
 
-/// A fixed number of decimals.
+/// A number with a fixed number of decimals.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() {
         crate::units::decimals(value, decimals).replace('-', "−")
@@ -29,25 +29,25 @@ pub(super) fn degrees(radians: f64) -> String {
     fixed(radians.to_degrees(), 1)
 }
 
-/// With a decimal where one is needed to tell it from 0 or 100 %.
+/// A percentage, with a decimal where it is needed to tell it from 0 or 100 %.
 pub(super) fn percent(share: f64) -> String {
     if share > 0.0 && share < 0.0005 {
         return "less than 0.1 %".into();
     }
     let near_an_end = |share: f64| share > 0.0 && share < 0.01;
     let decimals = usize::from(near_an_end(share) || near_an_end(1.0 - share));
-    // What is not all does not read as all.
+    // Less than all must not read as 100 %.
     let shown = if share < 1.0 { share.min(0.999) } else { share };
     format!("{} %", fixed(100.0 * shown, decimals))
 }
 
-/// `low – high`, or one number where they print alike.
+/// `low – high`, or one number where both print alike.
 pub(super) fn range([low, high]: [f64; 2], decimals: usize) -> String {
     let [low, high] = [low, high].map(|v| fixed(v, decimals));
     if low == high { low } else { format!("{low} – {high}") }
 }
 
-/// What views are worth, and the ends of its interval; from a million on in millions.
+/// A gain in nats and the ends of its interval; from a million on in millions.
 pub(super) fn nats(values: [f64; 3]) -> [String; 3] {
     let decimals = usize::from(values[0].abs() < 10.0);
     values.map(|v| {
@@ -55,7 +55,7 @@ pub(super) fn nats(values: [f64; 3]) -> [String; 3] {
     })
 }
 
-/// Decimals that keep two digits of `value`, seven at most.
+/// Number of decimals that keeps two digits of `value`, at most seven.
 pub(super) fn decimals_for(value: f64) -> usize {
     if !(value.is_finite() && value > 0.0) {
         return 2;
@@ -63,7 +63,7 @@ pub(super) fn decimals_for(value: f64) -> usize {
     (1 - value.log10().floor() as i32).clamp(0, 7) as usize
 }
 
-/// To `digits` significant digits, with a power of ten where that helps.
+/// A number to `digits` significant digits, with a power of ten where that helps.
 pub(super) fn significant(value: f64, digits: usize) -> Markup {
     if value == 0.0 || !value.is_finite() {
         return html! { (fixed(value, 0)) };
@@ -79,7 +79,7 @@ pub(super) fn significant(value: f64, digits: usize) -> Markup {
     html! { (mantissa) "·10" sup { (exponent) } }
 }
 
-/// `0.125 ± 0.001`: both to the digits that the error leaves.
+/// `0.1250 ± 0.0010`: both to two digits of the error.
 pub(super) fn with_error(value: f64, error: f64) -> Markup {
     if error.is_nan() || error <= 0.0 || value.abs().max(error) < PLAIN.start {
         return html! { (significant(value, 3)) " ± " (significant(error, 2)) };
@@ -88,7 +88,7 @@ pub(super) fn with_error(value: f64, error: f64) -> Markup {
     html! { (fixed(value, decimals)) " ± " (fixed(error, decimals)) }
 }
 
-/// `p = 0.012`, with its sign.
+/// `p = 0.012`, or `p < 10^−6`.
 pub(super) fn p_value(p: f64) -> Markup {
     html! {
         @if p < MIN_P { "p < 10" sup { "−6" } }
@@ -96,7 +96,7 @@ pub(super) fn p_value(p: f64) -> Markup {
     }
 }
 
-/// `two causes`: small numbers as words.
+/// `two causes`: a count with its noun, small numbers as words.
 pub(super) fn count(n: usize, noun: &str) -> String {
     const WORDS: [&str; 10] =
         ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"];
@@ -104,10 +104,10 @@ pub(super) fn count(n: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
-/// A formula in the notation of [`crate::model::SigmaForm::formula`], for the eye; names that
-/// `value` knows are replaced by their numbers.
+/// Typesets a formula in the notation of [`crate::model::SigmaForm::formula`]. Names that `value` knows are
+/// replaced by their numbers.
 pub(super) fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup {
-    // Words whole, all else letter by letter.
+    // Tokens are whole words and single other characters.
     let letters: Vec<char> = text.chars().collect();
     let tokens = letters.chunk_by(|a, b| a.is_alphanumeric() && b.is_alphanumeric());
     let tokens: Vec<String> = tokens.map(String::from_iter).collect();
@@ -117,7 +117,7 @@ pub(super) fn formula(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> Markup
     } }
 }
 
-/// The same as a line of Python, to six digits: `sigma_m = 0.0014*z**2`.
+/// The same formula as a line of Python, to six digits: `sigma_m = 0.0014*z**2`.
 pub(super) fn plain(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> String {
     let (left, right) = text.split_once('=').unwrap_or(("sigma", text));
     let letters: Vec<char> = right.trim().chars().collect();
@@ -127,7 +127,7 @@ pub(super) fn plain(text: &str, value: &dyn Fn(&str) -> Option<f64>) -> String {
     for token in tokens.map(String::from_iter) {
         let starts = token == "(" || token.chars().all(char::is_alphanumeric);
         if starts && operand && !power {
-            // Side by side is a product.
+            // Juxtaposition means product.
             plain = plain.trim_end().to_string() + "*";
         }
         match (value(&token).map(short), token.as_str()) {

@@ -1,17 +1,17 @@
-//! Published surfaces to draw beside a fit.
+//! Published surfaces drawn beside a fit.
 
 use std::str::FromStr;
 
 use crate::model::SigmaModel;
 
-/// A published surface, drawn beside the fit over the range that its authors measured.
+/// A published surface, drawn over the range that its authors measured.
 #[derive(Debug, Clone, Copy)]
 pub struct Overlay {
-    /// As on the command line.
+    /// Name on the command line.
     pub id: &'static str,
-    /// As in a legend.
+    /// Name in a legend.
     pub label: &'static str,
-    /// The surface with the range that was measured.
+    /// The surface with its measured range.
     pub model: fn() -> SigmaModel,
     pub(super) dashes: [i32; 2],
 }

@@ -1,4 +1,4 @@
-//! Residuals as pictures: blue nearer than expected, red farther, grey where nothing was measured.
+//! Residual images: blue is nearer than expected, red farther, grey not measured.
 
 use maud::Markup;
 
@@ -8,28 +8,27 @@ use super::document::picture;
 use crate::error::{Error, Result};
 use crate::stats::quantile;
 
-/// Palette (a third of the bytes of full colour): entry 0 is "no target", the rest run from the most
-/// negative to the most positive; odd in number, so that zero is exactly white.
+/// Colours of the palette besides entry 0, "no target". They run from the most negative to the most positive;
+/// their number is odd, so that zero is exactly white. An indexed picture takes a third of the bytes.
 const SHADES: u8 = 201;
 const NO_TARGET: [u8; 3] = [222, 222, 222];
-/// Share of the pixels that the scale covers; the few beyond it saturate.
+/// Share of the pixels that the scale covers; the rest saturate.
 const COVERED: f64 = 0.98;
-/// For a picture without any pixel.
+/// Scale of a picture without valid pixels.
 const EMPTY_SCALE: f64 = 1.0;
 
-/// Where the colours end: covers 98 % of the finite values, rounded up to 1, 2 or 5 times a power
-/// of ten.
+/// End of the colour scale: covers 98 % of the finite values, rounded up to 1, 2 or 5 times a power of ten.
 pub(super) fn scale(values: &[f32]) -> f64 {
     let sizes = values.iter().filter(|v| v.is_finite()).map(|v| f64::from(v.abs()));
     let size = quantile(&mut sizes.collect::<Vec<f64>>(), COVERED);
     size.filter(|size| *size > 0.0).map_or(EMPTY_SCALE, round_up)
 }
 
-/// Values row by row, white at zero and saturated at `farther` in red, `-farther` in blue; a
-/// disparity, which is larger for what is nearer, has a negative scale.
+/// Draws values row by row: white at zero, saturated red at `farther` and blue at `-farther`. The scale is
+/// negative for disparities, which are larger for nearer points.
 ///
 /// # Errors
-/// When the picture's size and its pixels disagree.
+/// If the size of the picture and the number of its pixels disagree.
 pub(super) fn residual_image(
     size: [usize; 2],
     values: &[f32],

@@ -1,4 +1,4 @@
-//! Sigma over distance and tilt where it was measured, as a map with iso-lines; gaps are hatched.
+//! Map of sigma over distance and tilt with iso-lines; what was not measured is hatched.
 
 use plotters::style::{RGBColor, WHITE};
 
@@ -12,23 +12,22 @@ use crate::measure::{SigmaRow, SigmaTable};
 use crate::model::SigmaModel;
 use crate::stats::range;
 
-/// Steps of colour: fine enough to look continuous.
+/// Number of colours: enough to look continuous.
 const SHADES: usize = 36;
-/// Cells of the map across and down; in each the colour is one and iso-lines are straight.
+/// Cells across and down the map; a cell has one colour, and iso-lines in it are straight.
 const CELLS: [usize; 2] = [180, 60];
-/// Share of each axis that shows what lies outside the valid range.
+/// Share of each axis that lies outside the valid range.
 const MARGIN: f64 = 0.06;
-/// A range narrower than this share of its value, or than this angle, is widened to be seen.
+/// A range narrower than this share of its value, or than this angle, is widened to be visible.
 const MIN_RANGE_SHARE: f64 = 0.04;
 const MIN_RANGE_DEG: f64 = 2.0;
-/// Labels stand at this height of the map where their line comes by, and keep this far apart
-/// (shares of the map) ...
+/// Preferred height of the labels, on their lines, and least distance between them (shares of the map) ...
 const LABEL_HEIGHT: f64 = 0.3;
 const LABELS_APART: [f64; 2] = [0.08, 0.06];
-/// ... and this far from its sides.
+/// ... and from the sides of the map.
 const LABEL_INSET: f64 = 0.02;
 
-/// The fitted sigma where cells were measured nearby.
+/// Map of the fitted sigma, drawn only near measured cells.
 pub fn sigma_map(table: &SigmaTable, model: &SigmaModel, names: &[&str]) -> Chart {
     let z = at_least(model.domain.z_m, MIN_RANGE_SHARE * model.domain.z_m[1]);
     let theta = at_least(model.domain.theta_rad.map(f64::to_degrees), MIN_RANGE_DEG);
@@ -76,16 +75,16 @@ fn colour(shade: usize) -> RGBColor {
 
 type Point = [f64; 2];
 
-/// A surface sampled on the corners of a lattice.
+/// A surface sampled at the corners of a lattice.
 struct Grid {
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Row by row, `x` fastest.
+    /// Row-major, `x` fastest.
     value: Vec<f64>,
 }
 
 impl Grid {
-    /// Denser towards the upper end of `y`, where the forms bend to their poles.
+    /// Samples denser towards the upper end of `y`, where the forms bend to their poles.
     fn sample([x, y]: [[f64; 2]; 2], f: &dyn Fn(f64, f64) -> f64) -> Self {
         let along = |[low, high]: [f64; 2], n: usize, share: fn(f64) -> f64| -> Vec<f64> {
             (0..=n).map(|i| low + (high - low) * share(i as f64 / n as f64)).collect()
@@ -95,13 +94,14 @@ impl Grid {
         Grid { x, y, value }
     }
 
-    /// Corners of a cell in turn, each with its value.
+    /// Corners of a cell in order, each with its value.
     fn corners(&self, i: usize, j: usize) -> [(Point, f64); 4] {
         [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
             .map(|(i, j)| ([self.x[i], self.y[j]], self.value[j * self.x.len() + i]))
     }
 
-    /// Every row in pieces, cut where the shade of a cell's mean changes; none where there is no shade.
+    /// Tiles of every row, split where the shade of the cells' means changes; cells without a shade are left
+    /// out.
     fn tiles(&self, shade: &dyn Fn(Point, f64) -> Option<usize>) -> Vec<Layer> {
         let mut tiles = Vec::new();
         for j in 0..CELLS[1] {
@@ -123,7 +123,7 @@ impl Grid {
         tiles
     }
 
-    /// By marching squares; labels over the lines.
+    /// Iso-lines by marching squares, with their labels on top.
     fn iso_lines(&self, levels: &[f64], shown: &dyn Fn(Point) -> bool) -> Vec<Layer> {
         let (mut layers, mut labels) = (Vec::new(), Vec::<(Point, f64)>::new());
         for &level in levels {
@@ -162,7 +162,7 @@ impl Grid {
     }
 }
 
-/// Where the level crosses the sides of a cell: none, two, or (a saddle) four times.
+/// Points where the level crosses the sides of a cell: none, two, or four at a saddle.
 fn crossings(corners: &[(Point, f64); 4], level: f64) -> Vec<Point> {
     let crossing = |k: usize| {
         let ((p, a), (q, b)) = (corners[k], corners[(k + 1) % 4]);

@@ -1,5 +1,5 @@
-//! The surface in slices: sigma against distance at a few tilts, sigma against tilt at a few
-//! distances (the paper's Fig. 2), each with what was measured; and by how much the fit misses it.
+//! Slices through the surface with the measured points: sigma against distance at a few tilts, sigma against
+//! tilt at a few distances (the paper's Fig. 2). Also the residuals of the fit.
 
 mod held;
 
@@ -16,43 +16,43 @@ use crate::measure::{SigmaRow, SigmaTable};
 use crate::model::SigmaModel;
 use crate::stats::range;
 
-/// Points of a curve.
+/// Samples along a curve.
 const SAMPLES: usize = 160;
 const LEVEL: f64 = 0.95;
-/// From this ratio of the largest sigma to the smallest a linear axis hides the small ones.
+/// Ratio of the largest to the smallest sigma from which a linear axis hides the small ones.
 const LOG_FROM_RATIO: f64 = 20.0;
 /// Share of the axis left free beyond the data.
 const MARGIN: f64 = 0.05;
 /// Narrowest tilt axis, degrees.
 const MIN_TILT_RANGE_DEG: f64 = 10.0;
-/// Curves, bands and bars are followed to this many times the largest point, not to a pole.
+/// Largest factor by which bands and bars extend the axis beyond the points; a band may reach to a pole.
 const BEYOND: f64 = 1.3;
 const BAND_OPACITY: f64 = 0.16;
-/// With more points than this their marks shrink and their edges fade.
+/// Number of points above which marks are smaller and their edges fainter.
 const MANY_POINTS: usize = 120;
-/// How far beside its line an overlay's mark stands, share of the axis.
+/// Distance of an overlay's mark from its line, share of the axis.
 const BESIDE: f64 = 0.015;
 
-/// Points of about one distance or tilt, and the fit there; x is degrees or m, y mm.
+/// Points at about one distance or tilt, and the fit there; x is degrees or m, y mm.
 struct Group {
-    /// Median of what is held, m or rad.
+    /// Median of the fixed quantity, m or rad.
     held: f64,
     label: String,
-    /// Sigma is carried along the fitted surface from its own place to the group's.
+    /// Sigma of each point, moved along the fitted surface from its own distance or tilt to the group's.
     points: Vec<[f64; 2]>,
-    /// One standard error either way, where it is known.
+    /// Plus and minus one standard error, where it is known.
     bars: Vec<[f64; 3]>,
-    /// The fit where it was measured, NaN elsewhere.
+    /// The fit, NaN where nothing was measured nearby.
     curve: Vec<[f64; 2]>,
-    /// The curve's 95 % interval, a piece for each stretch that was measured.
+    /// The curve's 95 % interval, one piece per measured stretch.
     bands: Vec<Vec<[f64; 3]>>,
     tips: Vec<([f64; 2], String)>,
     colour: RGBColor,
     mark: Mark,
 }
 
-/// Sigma against tilt, with the fit and the published surfaces at the same distances. A point is
-/// called by its view's name.
+/// Sigma against tilt, with the fit and the published surfaces at the same distances. `names` are those of
+/// the views, for the points' tips.
 pub fn figure2(
     table: &SigmaTable,
     model: &SigmaModel,
@@ -70,7 +70,7 @@ pub fn figure2(
     Held::Distance.drawn(chart, &groups, model, overlays)
 }
 
-/// Sigma against distance, with the fit at a few tilts and the published surfaces at the smallest.
+/// Sigma against distance, with the fit at a few tilts and the published surfaces at the smallest tilt.
 pub fn against_distance(table: &SigmaTable, model: &SigmaModel, names: &[&str]) -> Chart {
     let groups = Held::Tilt.groups(table, model, names);
     let axes = [distance_axis(table), sigma_axis(&groups)];
@@ -78,7 +78,7 @@ pub fn against_distance(table: &SigmaTable, model: &SigmaModel, names: &[&str]) 
     Held::Tilt.drawn(chart, &groups, model, &Overlay::ALL)
 }
 
-/// How far each measured sigma lies off the fit, against distance.
+/// Relative residuals of the fit against distance.
 pub fn fit_residuals(table: &SigmaTable, model: &SigmaModel, names: &[&str]) -> Chart {
     let off =
         |r: &SigmaRow, sigma_m: f64| 100.0 * (sigma_m / model.sigma(r.z_m, r.theta_rad) - 1.0);
@@ -111,7 +111,7 @@ fn distance_axis(table: &SigmaTable) -> Axis {
     Axis::with_margin(range(table.rows.iter().map(|r| r.z_m)), MARGIN).ticks_from(0.0)
 }
 
-/// Colour and mark of each of some groups.
+/// Colour and mark of each group.
 fn looks(groups: usize, points: usize) -> Vec<(RGBColor, Mark)> {
     let (radius, edge) = if points > MANY_POINTS { (4, INK.mix(0.6)) } else { (5, INK.into()) };
     let look = |i: usize| {
@@ -122,7 +122,7 @@ fn looks(groups: usize, points: usize) -> Vec<(RGBColor, Mark)> {
     (0..groups).map(look).collect()
 }
 
-/// The view's name, z, tilt and sigma of a point.
+/// Describes a point by its view's name, z, tilt and sigma.
 pub(super) fn tip(row: &SigmaRow, names: &[&str]) -> String {
     let name = names.get(row.view).map_or_else(String::new, |name| format!("{name}: "));
     let error = row.std_error_m().map_or_else(String::new, |e| format!(" ± {}", millimetres(e)));
@@ -214,9 +214,9 @@ impl Held {
         chart
     }
 
-    /// A published surface where it was measured, in the colour of each distance, with an open mark at
-    /// its squarest end that says which where colours are lost; or at the smallest tilt. Was anything
-    /// drawn?
+    /// Draws a published surface over its measured range: at every group's distance, or at the smallest tilt
+    /// only. Each distance's line has the group's colour and, at its most frontal end, the group's mark,
+    /// open, for readers without colour. Returns whether anything was drawn.
     fn draw_overlay(
         self,
         chart: &mut Chart,

@@ -1,4 +1,4 @@
-//! Trajectories against the truth: paths, errors over time, and figures, for every page that has them.
+//! Trajectories against ground truth: paths, errors over time and error statistics, for every page with them.
 
 use maud::{Markup, html};
 use nalgebra::Vector3;
@@ -16,13 +16,13 @@ use crate::units::counted;
 
 /// Room around the lines, share of their extent.
 const MARGIN: f64 = 0.04;
-/// Places of a line that answer a pointer.
+/// Most tips along a line.
 const MAX_TIPS: usize = 150;
 
-/// Its name, its points, and how it is drawn.
+/// Name, points and stroke of a line.
 pub(super) type Line = (String, Vec<[f64; 2]>, Stroke);
 
-/// `equal` when both axes are lengths of one plane.
+/// A line chart; `equal` gives both axes the same scale, for two lengths in a plane.
 pub(super) fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: bool) -> Chart {
     let extent = |k: usize| {
         let [low, high] = range(lines.iter().flat_map(|(_, points, _)| points).map(|p| p[k]));
@@ -47,18 +47,18 @@ pub(super) fn chart(title: &str, labels: [&str; 2], lines: Vec<Line>, equal: boo
     chart
 }
 
-/// An estimate against the truth.
+/// An estimate against ground truth.
 #[derive(Debug, Clone, Copy)]
 pub struct Against<'a> {
     pub truth: &'a [Pose],
     pub estimate: &'a [Pose],
     pub evaluation: &'a Evaluation,
-    /// Of the relative error.
+    /// Interval of the relative error.
     pub delta: Delta,
 }
 
 impl Against<'_> {
-    /// Both paths, and both errors over time, by file name.
+    /// The paths and both errors over time, each with its file name.
     pub fn charts(&self) -> [(&'static str, Chart); 3] {
         let e = self.evaluation;
         let rpe = format!("Relative pose error over {}", self.delta);
@@ -77,7 +77,7 @@ impl Against<'_> {
         ]
     }
 
-    /// In the plane of the two longest axes of the true path.
+    /// Paths in the plane of the two longest axes of the true path.
     fn paths(&self) -> Chart {
         let stamps = range(self.estimate.iter().map(|p| p.stamp));
         let within = |p: &&Pose| (stamps[0]..=stamps[1]).contains(&p.stamp);
@@ -101,7 +101,7 @@ impl Against<'_> {
         chart("Paths", [names[i], names[j]], lines, true)
     }
 
-    /// The figures as tiles and as a table, and the errors over time.
+    /// Error statistics as tiles and as a table, errors over time, and paths.
     pub(super) fn parts(&self) -> Result<Markup> {
         let e = self.evaluation;
         let row = |name: String, s: Spread| -> Vec<Markup> {
@@ -144,7 +144,7 @@ impl Against<'_> {
     }
 }
 
-/// The page of an evaluation.
+/// Renders the page of an evaluation as HTML text.
 pub fn evaluation_page(against: &Against<'_>, origin: &Origin) -> Result<String> {
     let title = "A trajectory against the ground truth";
     let body = html! {

@@ -1,4 +1,4 @@
-//! The calibration bench: a flat target, perhaps a wall behind, perhaps things in the way.
+//! The calibration bench: a flat target, optionally with a wall behind and clutter in front.
 
 use nalgebra::Vector3;
 
@@ -11,7 +11,7 @@ pub struct Board {
     pub height_m: f64,
 }
 
-/// What the sensor is turned to.
+/// What the sensor faces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {
     Board(Board),
@@ -19,7 +19,7 @@ pub enum Target {
     Wall,
 }
 
-/// A flat rectangle across the optical axis: a box's face, a hand, a cupboard.
+/// A flat rectangle perpendicular to the optical axis: a box's face, a hand, a cupboard.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch {
     pub centre: Vector3<f64>,
@@ -34,26 +34,26 @@ pub struct Bench {
     pub plane: Plane,
     pub target: Target,
     pub frame: TargetFrame,
-    /// Reflectance of the target by its own coordinates.
+    /// Reflectance of the target over its own coordinates.
     pub print: Print,
-    /// Depth of a wall across the axis, m.
+    /// Depth of a wall perpendicular to the axis, m.
     pub wall_m: Option<f64>,
     pub clutter: Vec<Patch>,
-    /// Rise of the middle over the edges of the board towards the sensor, m, parabolic along its
-    /// right: a board that is not flat.
+    /// Bow of the board, m: rise of its middle over its edges towards the sensor, parabolic along its
+    /// right.
     pub sagitta_m: f64,
 }
 
 /// What is printed on the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Print {
-    /// One grey all over.
+    /// Uniform grey.
     Plain(f64),
     /// Squares of this side, m, in eight greys from 1 down to 1/8.
     Patches(f64),
 }
 
-/// Side of a grey square that a person would print, m.
+/// Practical side of a printed grey square, m.
 pub const PATCH_SIDE_M: f64 = 0.15;
 /// Matt white paper at 830 nm.
 pub const WHITE: f64 = 0.8;
@@ -93,7 +93,7 @@ impl Bench {
         }
     }
 
-    /// The target along a ray; a bow of millimetres is met by iterating on the flat plane.
+    /// Intersects a ray with the target; a bow of millimetres is found by iterating from the flat plane.
     fn cast_target(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit> {
         let normal = self.plane.normal().into_inner();
         let slope = normal.dot(direction);
@@ -144,7 +144,7 @@ impl Bench {
     }
 }
 
-/// The bow is millimetres over decimetres: each round shrinks the error by the slope, below 0.1.
+/// The bow is millimetres over decimetres: each iteration shrinks the error by the slope, below 0.1.
 const BOW_ITERATIONS: usize = 4;
 
 impl Print {
@@ -153,7 +153,7 @@ impl Print {
             Print::Plain(albedo) => albedo,
             Print::Patches(side) => {
                 let (i, j) = ((s / side).floor() as i64, (t / side).floor() as i64);
-                // Neighbours differ, and no grey goes with one direction.
+                // Neighbours differ, and grey does not correlate with either direction.
                 f64::from((3 * i + 5 * j).rem_euclid(8) as i32 + 1) / 8.0
             }
         }

@@ -1,5 +1,5 @@
-//! What there is to see: surfaces that light can meet, and what every pixel of a camera sees of
-//! them, computed once a view.
+//! The scene: surfaces that light can hit, and what every camera pixel sees of them, computed once per
+//! view.
 //!
 //! Optical frame of the camera: x right, y down, z forward, metres.
 
@@ -13,23 +13,23 @@ use rayon::prelude::*;
 use crate::camera::{Camera, Rays};
 use crate::plane::Plane;
 
-/// The nearest surface along a direction from a place that is settled.
+/// Finds the nearest surface along a direction from a fixed origin.
 pub type RaysFrom<'a> = Box<dyn Fn(&Vector3<f64>) -> Option<Hit> + 'a>;
 
-/// Surfaces that light can meet.
+/// Surfaces that light can hit.
 pub trait World: Sync {
     /// The nearest surface along `origin + t * direction`, t > 0 (t in units of `direction`).
     fn cast(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit>;
 
-    /// The same for many rays from one place.
+    /// Like [`World::cast`], for many rays from one origin.
     fn from<'a>(&'a self, origin: Vector3<f64>) -> RaysFrom<'a> {
         Box::new(move |direction| self.cast(&origin, direction))
     }
 
-    /// The surfaces [`Hit::surface`] numbers.
+    /// The surfaces that [`Hit::surface`] indexes.
     fn surfaces(&self) -> Vec<Surface>;
 
-    /// The calibration target's own coordinates, where there is one.
+    /// Coordinate frame of the calibration target, if there is one.
     fn target(&self) -> Option<TargetFrame> {
         None
     }
@@ -38,7 +38,7 @@ pub trait World: Sync {
 /// Coordinates on a flat target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetFrame {
-    /// Where they begin, m.
+    /// Origin, m.
     pub centre: Vector3<f64>,
     /// Unit vectors along the target: to its right, and down.
     pub right: Vector3<f64>,
@@ -46,21 +46,21 @@ pub struct TargetFrame {
 }
 
 impl TargetFrame {
-    /// On a plane, its right as near to the image's horizontal as the tilt allows.
+    /// Frame on a plane, its right as near to the image's horizontal as the tilt allows.
     pub fn on(plane: &Plane, centre: Vector3<f64>) -> Self {
         let normal = plane.normal().into_inner();
         let right = Vector3::y().cross(&normal).normalize();
         TargetFrame { centre, right, down: normal.cross(&right) }
     }
 
-    /// Of a point, m: right and down of the centre.
+    /// Coordinates of a point, m: right and down of the centre.
     pub fn place(&self, point: &Vector3<f64>) -> (f64, f64) {
         let offset = point - self.centre;
         (offset.dot(&self.right), offset.dot(&self.down))
     }
 }
 
-/// Where a ray ends.
+/// Where a ray hits a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     pub t: f64,
@@ -68,20 +68,20 @@ pub struct Hit {
     pub normal: Vector3<f64>,
     /// Index into [`World::surfaces`].
     pub surface: u16,
-    /// Share of infrared light given back, 0 to 1.
+    /// Infrared reflectance, 0 to 1.
     pub albedo: f64,
 }
 
 /// One connected piece of the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface {
-    /// The calibration target (or a part of it).
+    /// Whether it belongs to the calibration target.
     pub is_target: bool,
-    /// Tilt against the optical axis, rad, where it is the same all over; `None` when curved.
+    /// Tilt against the optical axis, rad, where it is constant; otherwise `None`.
     pub theta_rad: Option<f64>,
 }
 
-/// Per pixel, row-major.
+/// What a camera sees, per pixel, row-major.
 #[derive(Debug, Clone)]
 pub struct Seen {
     pub width: usize,
@@ -90,9 +90,9 @@ pub struct Seen {
     pub depth: Vec<f32>,
     /// Unit normal towards the camera.
     pub normal: Vec<[f32; 3]>,
-    /// Index into `surfaces`; [`Seen::NOTHING`] past everything.
+    /// Index into `surfaces`; [`Seen::NOTHING`] where nothing is hit.
     pub surface: Vec<u16>,
-    /// Share of infrared light given back.
+    /// Infrared reflectance.
     pub albedo: Vec<f32>,
     pub surfaces: Vec<Surface>,
     pub target: Option<TargetFrame>,
@@ -101,7 +101,7 @@ pub struct Seen {
 impl Seen {
     pub const NOTHING: u16 = u16::MAX;
 
-    /// Cast the rays of all pixels from the camera's centre.
+    /// Casts the rays of all pixels from the camera's centre.
     pub fn of(world: &dyn World, camera: &Camera, rays: &Rays) -> Self {
         let hits: Vec<_> = (0..camera.pixels())
             .into_par_iter()

@@ -1,5 +1,5 @@
-//! A film to map: depth images in time order, with the colour image and the true pose that belong
-//! to each, where there are any. Frames are read one at a time, when they are needed.
+//! A film to map: depth images in time order, each with its colour image and true pose if there are any.
+//! Frames are read one at a time, on demand.
 //!
 //! Two layouts: that of the TUM RGB-D benchmark (depth.txt, rgb.txt, associations, groundtruth.txt)
 //! and that of 7-Scenes (frame-XXXXXX.color/.depth/.pose).
@@ -17,8 +17,8 @@ use crate::trajectory::Pose;
 use crate::units::{counted, verb};
 use crate::view::{FrameRef, Sensor};
 
-/// Open a folder in one of the two layouts.
-/// An error when it is neither, a list in it cannot be read, or it holds no depth image.
+/// Opens a folder in one of the two layouts, or a film in a file.
+/// Fails if it is neither, a list in it cannot be read, or it holds no depth image.
 pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     let mut sequence =
         if scenes::is_one(root) { scenes::open(root, assumed)? } else { tum::open(root, assumed)? };
@@ -36,10 +36,10 @@ pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moment {
-    /// Of the depth image, s.
+    /// Timestamp of the depth image, s.
     pub stamp: f64,
     pub depth: FrameRef,
-    /// The colour image of the same moment, with its own stamp.
+    /// The colour image of the same moment, with its own timestamp.
     pub colour: Option<FrameRef>,
 }
 
@@ -51,27 +51,27 @@ pub struct Sequence {
     pub moments: Vec<Moment>,
     /// True poses, in time order; empty where there are none.
     pub truth: Vec<Pose>,
-    /// Why the ground truth that is there is not used.
+    /// Why existing ground truth is not used.
     pub unused_truth: Option<String>,
     pub remarks: Vec<String>,
 }
 
 impl Sequence {
-    /// Every `stride`-th moment, at most `limit` of them.
+    /// Keeps every `stride`-th moment, at most `limit` of them.
     pub fn thin(&mut self, stride: usize, limit: Option<usize>) {
         let moments = std::mem::take(&mut self.moments);
         let kept = moments.into_iter().step_by(stride.max(1)).take(limit.unwrap_or(usize::MAX));
         self.moments = kept.collect();
     }
 
-    /// A depth image as stored.
-    /// An error when the file is damaged or not of the sensor's size.
+    /// Reads a depth image as stored.
+    /// Fails if the file is damaged or not of the sensor's size.
     pub fn depth(&self, moment: &Moment) -> Result<Frame> {
         read_depth(&moment.depth, self.sensor.camera.width, self.sensor.camera.height)
     }
 
-    /// The colour of a moment, where there is any. An error when the file is damaged or not of the
-    /// depth image's size.
+    /// Reads the colour image of a moment, if there is one.
+    /// Fails if the file is damaged or not of the depth image's size.
     pub fn colour(&self, moment: &Moment) -> Result<Option<ColourImage>> {
         let Some(path) = moment.colour.as_ref().map(|c| &c.path) else { return Ok(None) };
         let camera = &self.sensor.camera;
@@ -79,7 +79,7 @@ impl Sequence {
     }
 }
 
-/// A frame this many usual intervals after the one before it: frames are missing between them.
+/// An interval longer than this many usual ones is a gap: frames are missing.
 const GAP: f64 = 3.5;
 
 fn gaps(moments: &[Moment]) -> Option<String> {

@@ -1,4 +1,4 @@
-//! The layout of Microsoft's 7-Scenes: frame-XXXXXX.color.png, .depth.png, .pose.txt, no stamps.
+//! The layout of Microsoft's 7-Scenes: frame-XXXXXX.color.png, .depth.png, .pose.txt, no timestamps.
 
 use std::path::Path;
 
@@ -13,20 +13,20 @@ use crate::trajectory::{FARTHEST_PLACE_M, Pose};
 use crate::view::FrameRef;
 
 const DEPTH: &str = ".depth.png";
-/// Nominal; the frames carry no stamps.
+/// Nominal; the frames carry no timestamps.
 const RATE_HZ: f64 = 30.0;
-/// What 7-Scenes says of its Kinects: fx, fy, cx, cy, px.
+/// Intrinsics that 7-Scenes states for its Kinects: fx, fy, cx, cy, px.
 const INTRINSICS: [f64; 4] = [585.0, 585.0, 320.0, 240.0];
 /// Millimetres; 65535 is no measurement.
 const CODE: DepthCode = DepthCode::Metric { units_per_metre: 1000.0, invalid: 65535 };
 
-/// Does the folder hold frame-XXXXXX.depth.png?
+/// Whether the folder holds frame-XXXXXX.depth.png and no depth.txt.
 pub(super) fn is_one(root: &Path) -> bool {
     !root.join("depth.txt").is_file()
         && entries(root).is_ok_and(|files| files.iter().any(|p| stem(p).is_some()))
 }
 
-/// frame-XXXXXX of a depth image.
+/// Name (frame-XXXXXX) and number of a depth image.
 fn stem(path: &Path) -> Option<(String, f64)> {
     let name = path.file_name()?.to_str()?.strip_suffix(DEPTH)?;
     let number: f64 = name.strip_prefix("frame-")?.parse().ok()?;
@@ -65,7 +65,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, unused_truth: None, remarks })
 }
 
-/// A 4 x 4 matrix, `world_from_camera`; `None` where tracking had failed (not finite).
+/// Reads a 4 x 4 matrix, `world_from_camera`; `None` if tracking had failed (not finite).
 fn read_pose(path: &Path) -> Result<Option<Isometry3<f64>>> {
     let text = read_text(path)?;
     let numbers: Vec<f64> = text.split_whitespace().filter_map(|w| w.parse().ok()).collect();
@@ -80,7 +80,7 @@ fn read_pose(path: &Path) -> Result<Option<Isometry3<f64>>> {
     if let Some(what) = fault(&turn, &numbers) {
         return Err(Error::text(path, 0, what, REMEDY_POSE));
     }
-    // Printed digits leave it a little off a rotation.
+    // Rounded digits leave it slightly off a rotation.
     let near = Rotation3::from_matrix_eps(&turn, f64::EPSILON, MAX_ROUNDS, Rotation3::identity());
     let rotation = UnitQuaternion::from_rotation_matrix(&near);
     let shift = Vector3::new(numbers[3], numbers[7], numbers[11]);
@@ -88,12 +88,12 @@ fn read_pose(path: &Path) -> Result<Option<Isometry3<f64>>> {
 }
 
 const REMEDY_POSE: &str = "restore the file, or take it out";
-/// Products of rows of printed digits are off by a thousandth.
+/// Tolerance on a rotation: products of rows of printed digits are off by a thousandth.
 const OFF_ROTATION: f64 = 0.01;
-/// The search for the nearest rotation settles in a few from there.
+/// From there the search for the nearest rotation converges in a few rounds.
 const MAX_ROUNDS: usize = 100;
 
-/// Why these 4 x 4 numbers, with `turn` for their first corner, are no motion.
+/// Why these 4 x 4 numbers, with the 3 x 3 part `turn`, are not a rigid motion.
 fn fault(turn: &Matrix3<f64>, numbers: &[f64]) -> Option<String> {
     let off = (turn * turn.transpose() - Matrix3::identity()).amax();
     if off.is_nan() || off > OFF_ROTATION {

@@ -12,9 +12,9 @@ use crate::read::{first_there, is_there, read_text};
 use crate::trajectory::{associate, read_benchmark};
 use crate::view::FrameRef;
 
-/// Stamps of one moment differ by less, s (associate.py's `max_difference`).
+/// Largest difference between timestamps of one moment, s (associate.py's `max_difference`).
 const MAX_DIFFERENCE_S: f64 = 0.02;
-/// Names under which people keep what associate.py printed.
+/// Usual file names for the output of associate.py.
 const ASSOCIATIONS: [&str; 4] =
     ["associations.txt", "association.txt", "associate.txt", "associated.txt"];
 
@@ -76,7 +76,7 @@ fn no_sequence(root: &Path) -> Error {
     }
 }
 
-/// Every depth image with the colour image of its moment.
+/// Pairs every depth image with the colour image of its moment.
 fn with_colour(
     root: &Path,
     depth: Vec<FrameRef>,
@@ -114,7 +114,7 @@ fn nearest(
     Ok(partner)
 }
 
-/// "stamp path stamp path" lines: colour and depth in either order.
+/// Reads "stamp path stamp path" lines, with colour and depth in either order.
 fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<FrameRef>>> {
     let text = read_text(file)?;
     let place: HashMap<&PathBuf, usize> =
@@ -133,7 +133,7 @@ fn listed(root: &Path, file: &Path, depth: &[FrameRef]) -> Result<Vec<Option<Fra
             (Some(&k), None) => (k, second, other),
             (None, None) => continue,
         };
-        // Of a list that has no times the moment is the depth image's.
+        // Without a valid time in the list, the depth image's is used.
         let stamp =
             stamp.parse().ok().filter(|s: &f64| s.is_finite()).unwrap_or(depth[k].timestamp);
         partner[k] = colour.is_file().then(|| FrameRef::file(stamp, colour));

@@ -1,4 +1,4 @@
-//! The world by formula: sigma(z, theta) and the effects, in the order light meets them.
+//! Simulation by formula: sigma(z, theta) and the effects, in light-path order.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use crate::rng::Seed;
 use crate::scene::{Seen, World};
 use crate::view::Sensor;
 
-/// A sensor that errs by formula.
+/// A sensor whose errors follow formulas.
 pub struct FormulaSensor<'a> {
     pub sensor: &'a Sensor,
     pub rays: &'a Rays,
@@ -25,11 +25,11 @@ pub struct Shooting<'a> {
     /// In light-path order.
     effects: Vec<&'a Active>,
     seen: &'a Seen,
-    /// Of the room, lx: an office's, or what the view says.
+    /// Ambient light, lx: that of an office, or what the view states.
     pub ambient_lux: f64,
-    /// Where it is known.
+    /// Temperature, degrees Celsius, where known.
     pub temperature_c: Option<f64>,
-    /// Of the undisturbed depth, m.
+    /// Standard deviation at the undisturbed depth, without rounding, m.
     sigma: Vec<f32>,
     light: Vec<f32>,
     pub(super) memory: HashMap<&'static str, Vec<f32>>,
@@ -41,8 +41,8 @@ impl FormulaSensor<'_> {
         self.begin_at(seen, sigma_of(seen, self.sigma), HashMap::new())
     }
 
-    /// With sigma (m) already known, and what the effects remember of the frames before: for a
-    /// camera that moves, whose every frame sees something else.
+    /// Like [`FormulaSensor::begin`], with sigma (m) and the effects' memory of earlier frames given: for a
+    /// moving camera, which sees something else in every frame.
     pub(super) fn begin_at<'a>(
         &'a self,
         seen: &'a Seen,
@@ -106,7 +106,7 @@ impl Shooting<'_> {
     }
 }
 
-/// A single frame of a world, Gaussian noise of sigma(z, theta) and no effect.
+/// Takes a single frame of a world, with Gaussian noise of sigma(z, theta) and no effect.
 pub fn shoot(
     sensor: &Sensor,
     rays: &Rays,
@@ -120,7 +120,7 @@ pub fn shoot(
     camera.begin(&seen).shoot(first).depth
 }
 
-/// Depth with its noise, as the disparity a matcher would find.
+/// Adds the noise to the depth and converts it to the disparity that a matcher would find.
 fn match_up(exposure: &mut Exposure) {
     let scale = exposure.disparity_px_m() as f32;
     exposure.disparity = exposure
@@ -141,7 +141,7 @@ fn read_out(exposure: &mut Exposure) {
     }
 }
 
-/// Light falls off with the square of the distance and with the angle it meets.
+/// Light of every pixel: falls with the square of the distance and the cosine of the incidence angle.
 fn light_of(seen: &Seen, rays: &Rays) -> Vec<f32> {
     (0..seen.depth.len())
         .map(|i| {
@@ -154,8 +154,8 @@ fn light_of(seen: &Seen, rays: &Rays) -> Vec<f32> {
         .collect()
 }
 
-/// Sigma at the true depth and tilt of every pixel, m. On a flat surface it depends on depth
-/// alone, and a table spares a power a pixel.
+/// Sigma at the true depth and tilt of every pixel, m. On a flat surface it depends on depth alone, and a
+/// table saves a `powf` per pixel.
 fn sigma_of(seen: &Seen, model: &SigmaModel) -> Vec<f32> {
     let tables: Vec<Option<SigmaByDepth>> = seen
         .surfaces
@@ -176,8 +176,8 @@ fn sigma_of(seen: &Seen, model: &SigmaModel) -> Vec<f32> {
         .collect()
 }
 
-/// The model's sigma was measured on stored words; what their rounding adds by itself is not drawn
-/// again. Uniform over a step: variance step^2 / 12.
+/// Removes the rounding variance from sigma: the model's sigma was measured on stored values, and rounding
+/// is applied again. The rounding error is uniform over a step: variance step^2 / 12.
 fn without_rounding(mut sigma: Vec<f32>, seen: &Seen, sensor: &Sensor) -> Vec<f32> {
     for (sigma, &z) in sigma.iter_mut().zip(&seen.depth) {
         let z = f64::from(z);
@@ -194,7 +194,7 @@ struct SigmaByDepth {
     nodes: Vec<f64>,
 }
 
-/// Over 4 m a step of 2 mm: the curvature 2b of Eq. 1 errs by b step^2 / 4 = 2 nm.
+/// Over 4 m a step of 2 mm: with the curvature 2b of Eq. 1 the interpolation error is b step^2 / 4 = 2 nm.
 const NODES: usize = 2048;
 
 impl SigmaByDepth {

@@ -1,9 +1,9 @@
-//! Recordings that no sensor took: by formula, by speckle, or as a film of a room.
+//! Simulated recordings: by formula, by speckle, or as a film of a room.
 //!
-//! A [`Shoot`] is a list of [`ViewPlan`]s and a sensor. Its physics is sigma(z, theta) with the
-//! effects of the catalogue ([`FormulaSensor`]), or a Kinect of dots and a matcher in which errors
-//! arise by themselves ([`speckle`]). Output is written in the recording layout and read back by the
-//! same reader as real data; nothing in it says what was switched on.
+//! A [`Shoot`] is a list of [`ViewPlan`]s and a sensor. Its physics is either sigma(z, theta) with the
+//! effects of the catalogue ([`FormulaSensor`]), or a Kinect with projected dots and a matcher, in which
+//! the errors arise by themselves ([`speckle`]). The output has the recording layout and is read by the
+//! same reader as real data; it does not reveal what was switched on.
 
 mod formula;
 mod plan;
@@ -39,7 +39,7 @@ pub fn kinect_v1(shrink: usize) -> Sensor {
 /// Frame rate of every sensor of this kind, Hz.
 pub const RATE_HZ: f64 = 30.0;
 
-/// Distances times tilts; the tilt's direction alternates between the image's two axes.
+/// Every distance with every tilt; the tilt direction alternates between the image's two axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     pub distances_m: Vec<f64>,
@@ -60,11 +60,13 @@ impl GridView {
     }
 }
 
-/// Eq. 1 has its pole at 79.6 degrees; here sigma is still finite and the tilt term already shows.
+/// Steepest tilt: below the pole of Eq. 1 at 79.6 degrees, so sigma is still finite and the tilt term
+/// shows.
 const STEEPEST_DEG: f64 = 76.0;
 
 impl Grid {
-    /// The paper's: 1 to 4 m by 0.5 m, 0 to 80 degrees by 10, but 76 for 80, beyond Eq. 1's pole.
+    /// The paper's grid: 1 to 4 m in steps of 0.5 m, 0 to 80 degrees in steps of 10. 76 replaces 80
+    /// degrees, which lies beyond the pole of Eq. 1.
     pub fn paper() -> Self {
         let tilts = (0..8).map(|i| f64::from(10 * i)).chain([STEEPEST_DEG]);
         Grid {
@@ -73,7 +75,7 @@ impl Grid {
         }
     }
 
-    /// Every distance and tilt in each of these directions, rad; a tilt of zero has none.
+    /// Every distance and tilt in each of these directions, rad; a tilt of zero occurs once per distance.
     pub fn views_towards(&self, azimuths_rad: &[f64]) -> Vec<GridView> {
         let mut views = Vec::new();
         for &z_m in &self.distances_m {

@@ -1,5 +1,5 @@
-//! What to take: the views of a recording before the shutter opens, also those of a real recording
-//! again, for a simulated twin.
+//! Plans the views of a recording: a grid of poses, or the views of a real recording again for a simulated
+//! twin.
 
 use nalgebra::Vector3;
 use rand::Rng;
@@ -19,11 +19,11 @@ use crate::view::{Excluded, Recording, TargetSize, View, ViewNotes};
 pub struct ViewPlan {
     pub name: String,
     pub bench: Bench,
-    /// Pixels that may answer; `None` for all. Row-major.
+    /// Pixels that may have a depth; `None` for all. Row-major.
     pub mask: Option<Vec<bool>>,
-    /// One a frame, s.
+    /// Timestamp of each frame, s.
     pub stamps: Vec<f64>,
-    /// Light of the room on the target, lx.
+    /// Ambient light on the target, lx.
     pub ambient_lux: f64,
     pub notes: ViewNotes,
 }
@@ -38,8 +38,8 @@ impl ViewPlan {
         seen
     }
 
-    /// Time stamps and instants of the frames of view number `index`; `session_s` is the time
-    /// stamp at which the session began.
+    /// Timestamps and instants of the frames of view number `index`; `session_s` is the timestamp at which
+    /// the session began.
     pub fn instants(
         &self,
         index: usize,
@@ -52,23 +52,23 @@ impl ViewPlan {
     }
 }
 
-/// What stands on the bench beside the target.
+/// The target and what surrounds it on the bench.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scenery {
     pub target: Target,
     pub print: Print,
     /// How far behind the target's centre a wall stands, m.
     pub wall_gap_m: Option<f64>,
-    /// Boxes and hands between sensor and target, away from the optical axis.
+    /// Number of boxes and hands between sensor and target, off the optical axis.
     pub clutter: usize,
     /// Standard deviation of the reference distances, m; `None` writes none.
     pub reference_error_m: Option<f64>,
-    /// Write the room's temperature and light into every view; the light varies either way.
+    /// Whether the room's temperature and light are written into every view; the light varies either way.
     pub conditions: bool,
 }
 
 impl Scenery {
-    /// The target alone, white, nothing known about it.
+    /// A white target alone, without reference distances or conditions.
     pub fn bare(target: Target) -> Self {
         Scenery {
             target,
@@ -81,15 +81,15 @@ impl Scenery {
     }
 }
 
-/// From the start of one view to the start of the next, s: time to move a board.
+/// Time from the start of one view to the start of the next, s: enough to move a board.
 const VIEW_INTERVAL_S: f64 = 30.0;
-/// What a room has.
+/// Room temperature, degrees Celsius.
 const ROOM_TEMPERATURE_C: f64 = 22.0;
 
-/// From a room with drawn curtains to a place at the window, lx.
+/// Range of ambient light, lx: from a room with drawn curtains to a place at the window.
 const AMBIENT_LUX: [f64; 2] = [100.0, 2000.0];
 
-/// The poses as given, or `shuffled`, so that time and distance are not the same axis.
+/// Plans a view of each pose, in the given order or `shuffled`, which decorrelates time and distance.
 pub fn plan_grid(
     poses: &[GridView],
     scenery: &Scenery,
@@ -106,7 +106,7 @@ pub fn plan_grid(
 
 fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: Seed) -> ViewPlan {
     let start = index as f64 * VIEW_INTERVAL_S;
-    // Drawn whether or not any effect looks at it. Whole lx, as a meter shows.
+    // Drawn whether or not an effect uses it. Whole lx, as a light meter shows.
     let [dim, bright] = AMBIENT_LUX.map(f64::ln);
     let mut light = seed.stream(&format!("simulate/ambient/{index}"));
     let ambient_lux = light.random_range(dim..bright).exp().round();
@@ -129,7 +129,7 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
         ambient_lux,
         stamps: (0..frames).map(|k| start + k as f64 / RATE_HZ).collect(),
         notes: ViewNotes {
-            // Only a view that says something else has a view.json too.
+            // The target's size alone does not warrant a view.json.
             target: target.filter(|_| reference_distance_m.is_some() || scenery.conditions),
             reference_distance_m,
             temperature_c: scenery.conditions.then_some(ROOM_TEMPERATURE_C),
@@ -139,13 +139,13 @@ fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: S
     }
 }
 
-/// What a tape of this standard deviation, m, reads; never less than nothing.
+/// Reading of a tape measure with this standard deviation, m; `None` unless positive.
 fn reference(truth_m: f64, error_m: f64, seed: Seed, view: &str) -> Option<f64> {
     let off: f64 = StandardNormal.sample(&mut seed.stream(&format!("simulate/reference/{view}")));
     Some(truth_m + error_m * off).filter(|d| *d > 0.0)
 }
 
-/// Boxes nearer than the target, beside the axis by 0.15 to 0.35 of the depth.
+/// Boxes nearer than the target, off the axis by 0.2 to 0.4 of their depth.
 fn clutter(z: f64, count: usize, seed: Seed, view: usize) -> Vec<Patch> {
     let mut rng = seed.stream(&format!("simulate/clutter/{view}"));
     (0..count)
@@ -163,10 +163,10 @@ fn clutter(z: f64, count: usize, seed: Seed, view: usize) -> Vec<Patch> {
         .collect()
 }
 
-/// The views of `recording`: same planes, regions, pixels, frames and timestamps. A reference
-/// distance becomes the simulated plane's own, with `reference_error_m` of noise.
+/// Plans the views of `recording` again: same planes, regions, pixels, frames and timestamps. Reference
+/// distances become those of the simulated planes, with `reference_error_m` of noise.
 ///
-/// Views without a plane are returned beside, with the reason.
+/// Views without a plane are returned separately, with the reason.
 pub fn plan_like(
     recording: &Recording,
     reference_error_m: f64,
@@ -190,7 +190,7 @@ pub fn plan_like(
     (found.into_iter().map(plan).collect(), excluded)
 }
 
-/// A view of these pixels of a plane.
+/// Plans a view of these pixels of a plane.
 pub fn plan_on(
     name: &str,
     plane: &Plane,
@@ -210,11 +210,11 @@ pub fn plan_on(
         name: name.into(),
         bench: Bench {
             frame: TargetFrame::on(plane, middle / pixels.len() as f64),
-            // The pixels of the real target are its outline.
+            // The mask of the real target's pixels is its outline.
             ..Bench::bare(*plane, Target::Wall)
         },
         mask: Some(mask),
-        // As measured; where it was not, the same in all views.
+        // As measured; otherwise the same in all views.
         ambient_lux: notes.ambient_lux.unwrap_or(ROOM_LUX),
         stamps,
         notes,

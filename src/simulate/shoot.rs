@@ -24,7 +24,7 @@ use crate::rng::Seed;
 use crate::scene::Target;
 use crate::view::Sensor;
 
-/// By which world the frames are made.
+/// How the frames are made.
 #[derive(Debug, Clone)]
 pub enum Physics {
     /// sigma(z, theta) and the effects, in light-path order.
@@ -34,7 +34,7 @@ pub enum Physics {
 }
 
 impl Physics {
-    /// For a recipe.
+    /// The physics as JSON, for a recipe.
     pub(super) fn described(&self) -> serde_json::Value {
         match self {
             Physics::Formula { sigma, effects } => serde_json::json!({
@@ -59,7 +59,7 @@ pub struct Shoot {
 }
 
 impl Shoot {
-    /// A bare target at these poses in random order, Gaussian noise of sigma(z, theta).
+    /// A bare target at these poses in random order, with Gaussian noise of sigma(z, theta).
     pub fn plain(
         sensor: Sensor,
         target: Target,
@@ -77,13 +77,14 @@ impl Shoot {
         }
     }
 
-    /// Write the whole recording into `root`, new or empty, a view a folder. Returns the names of the
-    /// views that show no depth at all: the target is out of the picture, or beyond the depth code.
+    /// Writes the whole recording into `root`, which must be new or empty, one folder per view. Returns the
+    /// names of the views that show no depth at all: the target is out of the picture, or beyond the depth
+    /// code.
     pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<Vec<String>> {
         self.write_as(encode_png16, root, progress)
     }
 
-    /// The same at the quickest compression: half the time of a speckle recording.
+    /// Like [`Shoot::write`], at the fastest compression: half the time for a speckle recording.
     pub fn write_quickly(&self, root: &Path, progress: Progress<'_>) -> Result<Vec<String>> {
         self.write_as(encode_png16_quickly, root, progress)
     }
@@ -119,7 +120,7 @@ impl Shoot {
         Ok(views?.into_iter().flatten().collect())
     }
 
-    /// What was switched on, for a file of its own.
+    /// The seed, physics and planes as JSON, for a separate file.
     pub fn recipe(&self) -> serde_json::Value {
         let view = |v: &ViewPlan| {
             let q = v.bench.plane.q;
@@ -173,7 +174,7 @@ impl Shoot {
         Ok(())
     }
 
-    /// The infrared picture of a formula's light: 10 bits, shot and read noise.
+    /// Infrared picture of the simulated light: 10 bits, with shot and read noise.
     fn amplitude(&self, shot: &Shot, instant: Instant) -> Frame {
         let name = format!("simulate/infrared/{}/{}", instant.view, instant.frame);
         let mut noise = vec![0f32; shot.light.len()];
@@ -191,19 +192,19 @@ impl Shoot {
 const DN_AT_1_M: f32 = 590.0;
 /// Same source.
 const READ_NOISE_DN: f32 = 10.4;
-/// A 10-bit sensor of this class fills up at some 10,000 electrons.
+/// A 10-bit sensor of this class has a full well of some 10,000 electrons.
 const ELECTRONS_PER_DN: f32 = 10.0;
 
 type Encode = fn(&Frame) -> Result<Vec<u8>>;
 
-/// A view's folder as it fills.
+/// A view's folder while it is written.
 struct ViewFolder {
     encode: Encode,
     root: PathBuf,
     depth_list: String,
     infrared_list: String,
     frames: usize,
-    /// Some pixel of some frame carries a depth.
+    /// Whether any pixel of any frame has a depth.
     sees: bool,
     code: DepthCode,
 }
@@ -244,7 +245,7 @@ impl ViewFolder {
         if self.root.join("ir").is_dir() {
             write_atomic(&self.root.join("ir.txt"), self.infrared_list.as_bytes())?;
         }
-        // Last: a view without its list is no view, so a kill leaves none half done.
+        // Last: a view without its list is ignored, so an interrupted run leaves no incomplete view.
         write_atomic(&self.root.join("depth.txt"), self.depth_list.as_bytes())
     }
 }

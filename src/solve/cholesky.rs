@@ -1,12 +1,12 @@
-//! Symmetric positive definite systems of some hundred unknowns.
+//! Cholesky factors for systems of some hundred unknowns.
 
 use nalgebra::{DMatrix, DVector};
 
-/// A = L L', in panels, so that nearly all work is in products of matrices (Golub and Van Loan 2013,
-/// section 4.2.9): several times as fast as column by column from a hundred unknowns on.
+/// A = L L', blocked, so that nearly all work is in matrix products (Golub and Van Loan 2013, section
+/// 4.2.9): several times as fast as column by column from a hundred unknowns on.
 #[derive(Debug, Clone)]
 pub struct Cholesky {
-    /// What is above the diagonal has no meaning.
+    /// The entries above the diagonal are meaningless.
     lower: DMatrix<f64>,
 }
 
@@ -14,7 +14,7 @@ pub struct Cholesky {
 const PANEL: usize = 48;
 
 impl Cholesky {
-    /// `None` where `a` is not positive definite. Only its lower triangle is read.
+    /// Factorises `a`; `None` where it is not positive definite. Only its lower triangle is read.
     pub fn of(mut a: DMatrix<f64>) -> Option<Self> {
         let n = a.nrows();
         for first in (0..n).step_by(PANEL) {
@@ -37,19 +37,19 @@ impl Cholesky {
         Some(Cholesky { lower: a })
     }
 
-    /// L.
+    /// The factor L.
     pub fn l(&self) -> DMatrix<f64> {
         self.lower.lower_triangle()
     }
 
-    /// The solution of A x = b.
+    /// Solves A x = b.
     pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         let n = b.len();
         let x = self.solve_all(DMatrix::from_column_slice(n, 1, b.as_slice()));
         DVector::from_column_slice(x.as_slice())
     }
 
-    /// The same for every column.
+    /// Solves A x = b for every column of `b`.
     pub fn solve_all(&self, mut b: DMatrix<f64>) -> DMatrix<f64> {
         let (n, m) = b.shape();
         let corner = |first: usize, width| self.lower.view((first, first), (width, width));
@@ -95,7 +95,7 @@ mod tests {
         &x * x.transpose() + DMatrix::identity(n, n)
     }
 
-    /// Below a panel, on its edge, and over several.
+    /// For sizes below a panel, at its edge, and over several.
     #[test]
     fn it_solves_what_it_was_made_of() {
         for n in [1, 7, PANEL, PANEL + 1, 3 * PANEL - 2] {

@@ -1,5 +1,5 @@
-//! Symmetric systems, what a least-squares fit leaves, and the argmin solvers that the fits use, each
-//! with a limit on its steps.
+//! Symmetric systems, residuals of least-squares fits, and the argmin solvers that the fits use, each with
+//! a limit on its steps.
 
 mod cholesky;
 
@@ -21,7 +21,7 @@ pub trait LeastSquares {
     fn cost(&self, x: &DVector<f64>) -> f64;
 }
 
-/// The best point on a solver's way.
+/// The best point a solver visited.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
     pub x: DVector<f64>,
@@ -29,8 +29,8 @@ pub struct Minimum {
     pub cost: f64,
 }
 
-/// A problem in argmin's terms. Gradient and Hessian are asked for at the same point one after the
-/// other, and both come from one linearisation: the last is kept.
+/// Adapts a problem to argmin. Gradient and Hessian are requested one after the other at the same point and
+/// share a linearisation, so the last one is cached.
 struct AsArgmin<'a, P> {
     problem: &'a P,
     last: RefCell<Option<Linear>>,
@@ -43,7 +43,7 @@ struct Linear {
 }
 
 impl<P: LeastSquares> AsArgmin<'_, P> {
-    /// J'r and, by Gauss and Newton, J'J.
+    /// Gradient J'r and Gauss-Newton Hessian J'J at a point.
     fn linear<T>(&self, at: &DVector<f64>, take: impl Fn(&Linear) -> T) -> T {
         let mut last = self.last.borrow_mut();
         if let Some(linear) = last.as_ref().filter(|l| l.at == *at) {
@@ -82,14 +82,14 @@ impl<P: LeastSquares> Hessian for AsArgmin<'_, P> {
     }
 }
 
-/// argmin's solvers compare costs; NaN would pass every comparison.
+/// argmin's solvers compare costs, and NaN would pass every comparison.
 fn finite_or_huge(cost: f64) -> f64 {
     if cost.is_finite() { cost } else { f64::MAX / 4.0 }
 }
 
-/// Trust region with Steihaug's truncated conjugate gradients on the Gauss-Newton Hessian, from
-/// a start that is already near: the only one of argmin's solvers that almost always converges
-/// on the fit of sigma. At most `max_steps` steps; the best point on the way, which is the start
+/// Minimises by a trust region with Steihaug's truncated conjugate gradients on the Gauss-Newton Hessian,
+/// from a start that is already near: the only one of argmin's solvers that almost always converges on the
+/// fit of sigma. Takes at most `max_steps` steps and returns the best point visited, which is the start
 /// where the solver fails. `None` when the start is outside the domain.
 pub fn trust_region<P: LeastSquares>(
     problem: &P,
@@ -138,8 +138,8 @@ impl<F: Fn(f64) -> f64> CostFunction for OfOne<F> {
     }
 }
 
-/// Where a function of one number has its minimum within an interval, to so much, by Brent's method;
-/// `None` where the interval is none.
+/// Minimum of a function of one variable within an interval, to the absolute `tolerance`, by Brent's
+/// method; `None` where the interval is not valid.
 pub fn brent(
     cost: impl Fn(f64) -> f64,
     [low, high]: [f64; 2],
@@ -154,7 +154,7 @@ pub fn brent(
     run.ok()?.state().get_best_param().copied()
 }
 
-/// Nelder-Mead from a simplex of the given edge lengths around `start`.
+/// Minimises by Nelder-Mead, from a simplex at `start` with the given edge lengths.
 pub fn nelder_mead(
     cost: impl Fn(&[f64]) -> f64,
     start: &[f64],
@@ -177,20 +177,20 @@ pub fn nelder_mead(
     run.ok().and_then(|r| r.state().get_best_param().cloned()).unwrap_or_else(|| start.to_vec())
 }
 
-/// Singular values below this share of the greatest are rounding.
+/// Singular values below this share of the largest are rounding errors.
 const TINY: f64 = 1e-6;
 
-/// What is left of a response.
+/// Residual of a response after a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Left {
     /// Sum of squares.
     pub squares: f64,
-    /// Degrees of freedom: rows less what the columns determine.
+    /// Degrees of freedom: rows less the rank of the columns.
     pub free: f64,
 }
 
-/// Least squares by SVD, so that columns which say the same count once: the coefficients, and how many
-/// columns say something of their own. `None` where there is no decomposition.
+/// Least squares by SVD, so that linearly dependent columns count once: the coefficients and the rank.
+/// `None` where there is no decomposition.
 pub fn fit_by_svd(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<(DVector<f64>, usize)> {
     let svd = x.clone().svd(true, true);
     let tiny = TINY * svd.singular_values.max();
@@ -198,13 +198,13 @@ pub fn fit_by_svd(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<(DVector<f64>, u
     Some((beta, svd.rank(tiny)))
 }
 
-/// What the columns of `x` do not explain of `y`; see [`fit_by_svd`].
+/// Residual of `y` after the fit of the columns of `x`; see [`fit_by_svd`].
 pub fn left_by_fit(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<Left> {
     let (beta, rank) = fit_by_svd(x, y)?;
     Some(Left { squares: (y - x * beta).norm_squared(), free: (y.len() - rank) as f64 })
 }
 
-/// Normal equations of the plane 1, x, y through values of some weight, as they come.
+/// Normal equations of the plane 1, x, y through (place, value, weight), skipping values not finite.
 pub fn plane_equations(
     points: impl Iterator<Item = ([f64; 2], f64, f64)>,
 ) -> (Matrix3<f64>, Vector3<f64>) {
@@ -217,7 +217,7 @@ pub fn plane_equations(
     (a, b)
 }
 
-/// Its three coefficients.
+/// The three coefficients of [`plane_equations`], if determined.
 pub fn plane_through(points: impl Iterator<Item = ([f64; 2], f64, f64)>) -> Option<Vector3<f64>> {
     let (a, b) = plane_equations(points);
     a.lu().solve(&b)
@@ -255,7 +255,7 @@ mod tests {
         assert!((x[0] - 2.0).abs() < 1e-3 && x[1].abs() < 1e-3, "{x:?}");
     }
 
-    /// A line through four points, and the same line with a column too many.
+    /// A line through four points, and the same line with a redundant column.
     #[test]
     fn columns_that_say_the_same_count_once() {
         let y = DVector::from_row_slice(&[1.0, 3.0, 2.0, 4.6]);
@@ -268,7 +268,7 @@ mod tests {
         }
     }
 
-    /// Total sum of squares less the slope's share.
+    /// Total sum of squares less the part explained by the slope.
     fn expected(y: &DVector<f64>) -> f64 {
         let mean = y.mean();
         let x = |i: usize| i as f64 - 1.5;

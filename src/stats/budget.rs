@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::student_coverage;
 
-/// The factor that all expanded uncertainties are given with.
+/// Coverage factor of all expanded uncertainties.
 pub const COVERAGE_FACTOR: f64 = 2.0;
 
 /// How a standard uncertainty was evaluated (GUM 4.2 and 4.3).
@@ -29,7 +29,7 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// For people.
+    /// Human-readable name.
     pub fn description(self) -> &'static str {
         match self {
             Distribution::Normal => "normal",
@@ -59,14 +59,14 @@ pub struct Component {
 }
 
 impl Component {
-    /// From statistics of the readings themselves, in m.
+    /// Type A component in m, from statistics of the readings.
     pub fn type_a(quantity: &str, standard_uncertainty_m: f64, degrees_of_freedom: f64) -> Self {
         let degrees_of_freedom = Some(degrees_of_freedom);
         let normal = Self::type_b(quantity, Distribution::Normal, standard_uncertainty_m);
         Component { evaluation: Evaluation::A, degrees_of_freedom, ..normal }
     }
 
-    /// Stated, or known of how the thing is made, in m.
+    /// Type B component in m, stated or known from construction.
     pub fn type_b(quantity: &str, distribution: Distribution, standard_uncertainty_m: f64) -> Self {
         Component {
             quantity: quantity.into(),
@@ -80,7 +80,7 @@ impl Component {
         }
     }
 
-    /// Of an input in another unit, by which the measurand changes as said, m per unit.
+    /// Converts to an input in another unit, with its sensitivity in m per unit.
     pub fn times(self, unit: &str, sensitivity: f64) -> Self {
         let contribution_m = (sensitivity * self.standard_uncertainty).abs();
         Component { unit: unit.into(), sensitivity, contribution_m, ..self }
@@ -104,7 +104,7 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// Of independent inputs.
+    /// Combines independent inputs.
     pub fn of(value_m: f64, components: Vec<Component>) -> Self {
         let combined_m = components.iter().map(|c| c.contribution_m).fold(0.0, f64::hypot);
         let degrees_of_freedom = welch_satterthwaite(combined_m, &components);
@@ -114,8 +114,8 @@ impl Budget {
     }
 }
 
-/// u^4 over the sum of u_i^4/nu_i (GUM G.2b); `None` where no component has finite ones. Shares of u,
-/// so that no power underflows.
+/// u^4 over the sum of u_i^4/nu_i (GUM G.2b); `None` where no component has finite degrees of freedom.
+/// Computed from shares of u, so that no power underflows.
 fn welch_satterthwaite(combined_m: f64, components: &[Component]) -> Option<f64> {
     let share =
         |c: &Component| Some((c.contribution_m / combined_m).powi(4) / c.degrees_of_freedom?);
@@ -124,12 +124,13 @@ fn welch_satterthwaite(combined_m: f64, components: &[Component]) -> Option<f64>
     freedom.is_finite().then_some(freedom)
 }
 
-/// Standard uncertainty that rounding to steps leaves in a mean of many readings whose noise, before
-/// rounding, has the standard deviation `sigma`; in the unit of both.
+/// Standard uncertainty that rounding to `step` leaves in the mean of many readings whose noise before
+/// rounding has standard deviation `sigma`; in the unit of both.
 ///
-/// The mean of rounded Gaussians errs by the sum over m of step/(pi m) exp(-2 (pi m sigma/step)^2)
-/// sin(2 pi m x/step), up to signs (Widrow and Kollar 2008, section 4). With x anywhere in the step,
-/// the variance is the sum of half the squares: step^2/12, GUM F.2.2.1, without noise.
+/// The error of the mean of rounded Gaussians is the sum over m of
+/// step/(pi m) exp(-2 (pi m sigma/step)^2) sin(2 pi m x/step), up to signs (Widrow and Kollar 2008,
+/// section 4). With x uniform in the step, the variance is half the sum of the squared amplitudes:
+/// step^2/12 without noise (GUM F.2.2.1).
 pub fn rounding_uncertainty(step: f64, sigma: f64) -> f64 {
     const NEGLIGIBLE: f64 = 40.0;
     const MANY: usize = 2000;
@@ -146,7 +147,7 @@ pub fn rounding_uncertainty(step: f64, sigma: f64) -> f64 {
         let height = (m * std::f64::consts::PI).recip();
         (exponent < NEGLIGIBLE).then(|| 0.5 * height * height * (-exponent).exp())
     });
-    // A sum of nothing is minus zero.
+    // An empty `sum()` is minus zero.
     let square = squares.fold(0.0, |sum, s| sum + s);
     step * square.sqrt()
 }
@@ -166,7 +167,7 @@ mod tests {
     }
 
     /// GUM H.1, the end gauge, Table H.1 and H.1.6: 25, 9.7, 2.9 and 16.6 nm with 18, 25.6, 50 and 2
-    /// degrees of freedom make u^2 = 1002 nm^2 (31.7 nm) and 16.7 of them.
+    /// degrees of freedom give u^2 = 1002 nm^2 (31.7 nm) with 16.7 degrees of freedom.
     #[test]
     fn the_end_gauge_of_the_gum() {
         const NM: f64 = 1e-9;
@@ -182,7 +183,7 @@ mod tests {
         assert!((gauge.expanded_m / NM - 63.4).abs() < 0.1);
     }
 
-    /// GUM G.4.2: 0.25 %, 0.57 % and 0.82 % with 9, 4 and 14 make 1.03 % and 19.0.
+    /// GUM G.4.2: 0.25 %, 0.57 % and 0.82 % with 9, 4 and 14 give 1.03 % with 19.0.
     #[test]
     fn the_product_of_three_of_the_gum() {
         let product = of(&[(0.25, Some(9.0)), (0.57, Some(4.0)), (0.82, Some(14.0))]);
@@ -190,7 +191,7 @@ mod tests {
         assert!((product.degrees_of_freedom.unwrap() - 19.0).abs() < 0.1, "{product:?}");
     }
 
-    /// GUM Table G.2: k = 2 holds 95.45 % with infinite degrees of freedom; 2.28 does with ten, and
+    /// GUM Table G.2: 95.45 % are covered by k = 2 with infinite degrees of freedom, 2.28 with ten, and
     /// 13.97 with one.
     #[test]
     fn coverage_is_students() {
@@ -214,14 +215,14 @@ mod tests {
     #[test]
     fn rounding_without_noise_is_rectangular_and_noise_takes_it_away() {
         assert!((rounding_uncertainty(0.012, 0.0) - 0.012 / 12f64.sqrt()).abs() < 1e-12);
-        // A hundredth of a step: all harmonics but the farthest.
+        // Noise of a hundredth of a step damps only the highest harmonics.
         assert!((rounding_uncertainty(1.0, 0.01) - 1.0 / 12f64.sqrt()).abs() < 0.02);
         assert!(rounding_uncertainty(1.0, 1.0) < 1e-8);
         assert!(rounding_uncertainty(1.0, 3.0).is_sign_positive(), "no minus zero on a page");
         assert_eq!(rounding_uncertainty(0.0, 0.001), 0.0);
     }
 
-    /// Against rounded draws: the mean's error at places spread over the step.
+    /// Compares with the mean error of rounded draws at positions spread over the step.
     #[test]
     fn rounding_is_what_rounded_draws_show() {
         let mut rng = Seed(5).stream("rounding");

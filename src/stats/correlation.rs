@@ -1,11 +1,11 @@
-//! How many independent samples a patch of correlated pixels is worth.
+//! Effective number of independent samples in a patch of correlated pixels.
 
 use super::{MAD_TO_SIGMA, median_in_place};
 
 /// Spatial correlation of a residual image, summed along columns and rows.
 ///
-/// The sums treat the correlation as the product of its course along u and along v, which is
-/// exact for a rectangular matching window.
+/// The sums treat the correlation as separable in u and v, which is exact for a rectangular matching
+/// window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlation {
     /// rho(lag, 0), lag = 0, 1, 2 ... px along the columns.
@@ -14,29 +14,30 @@ pub struct Correlation {
     pub along_v: Vec<f64>,
     /// Sum of rho over all lags: pixels per independent sample of a *mean*.
     pub sum: f64,
-    /// Sum of the squares' correlation over all lags: pixels per independent sample of a *variance*. It is rho^2 of
-    /// Gaussian noise, and more of pixels that are copies of their neighbours.
+    /// Sum over all lags of the correlation of squares: pixels per independent sample of a *variance*. That
+    /// correlation is rho^2 for Gaussian noise and more for pixels that are copies of their neighbours.
     pub sum_of_squares: f64,
-    /// The correlation had not died out at the longest lag: what is left is not noise but a
-    /// smooth error (a bowl, bands), and the sums are lower bounds.
+    /// Whether the correlation has not died out at the longest lag: the residual then holds a smooth
+    /// error (a bowl, bands), and the sums are lower bounds.
     pub persists: bool,
 }
 
-/// Longest lag looked at, px: four times a Kinect's matching window.
+/// Longest lag evaluated, px: four times a Kinect's matching window.
 pub const LONGEST_LAG: usize = 40;
-/// Correlations below this count as dead.
+/// Correlations below this count as died out.
 const DEAD: f64 = 0.05;
-/// The squares' correlation is told from rho^2 from so many times two standard errors on, .1 for [`PAIRS`]: copied
-/// pixels differ by .25, and noise that is Gaussian keeps the exact relation, which errs less.
+/// The measured correlation of squares replaces rho^2 only where it is larger by this many times two
+/// standard errors, 0.1 at [`PAIRS`]. Copied pixels differ by 0.25; Gaussian noise keeps the exact relation,
+/// which has the smaller error.
 const CLEARLY: f64 = 5.0;
-/// What lies farther out, in standard deviations, has no part in the correlation of squares: a few hundred pixels of
-/// an error that stands still would outweigh all noise.
+/// Values beyond this many standard deviations are left out of the correlation of squares: a few hundred
+/// pixels of a static error would outweigh all noise.
 const CUT: f64 = 3.5;
-/// Pairs looked at per lag; the standard error of a correlation is then 0.01.
+/// Pairs evaluated per lag; the standard error of a correlation is then 0.01.
 const PAIRS: usize = 10_000;
 
 impl Correlation {
-    /// Of pixels that have nothing in common.
+    /// Correlation of white noise.
     pub fn white() -> Self {
         let alone = || vec![1.0];
         Correlation {
@@ -49,7 +50,7 @@ impl Correlation {
     }
 }
 
-/// Measure on the residual `field` (row-major, `width` wide, NaN where there is none).
+/// Measures the correlation of the residual `field` (row-major, `width` wide, NaN where there is none).
 pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
     let valid = field.iter().filter(|e| e.is_finite()).count();
     let stride = (valid / PAIRS).max(1);
@@ -68,8 +69,8 @@ pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
     }
 }
 
-/// Correlation at lag 0, 1, 2 ... until it is dead, and that of the squares; `partner(i, u, lag)` is the value that
-/// far from sample `i` of column `u`.
+/// Correlation at lags 0, 1, 2 ... until it dies out, and that of the squares; `partner(i, u, lag)` is the
+/// value `lag` px from sample `i` of column `u`.
 fn course(
     field: &[f32],
     width: usize,
@@ -81,7 +82,7 @@ fn course(
     if valid < 100 || width == 0 {
         return (course, squares);
     }
-    // A stride that shares no factor with the width visits all columns.
+    // An odd stride, so that an even width does not confine it to a few columns.
     let stride = if stride > 1 { stride | 1 } else { 1 };
     let there = |i: usize| field[i].is_finite().then(|| (i, i % width));
     let samples: Vec<(usize, usize)> = (0..field.len()).step_by(stride).filter_map(there).collect();
@@ -106,14 +107,14 @@ fn course(
         let rho = if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 };
         let noise = 2.0 / (n.max(1) as f64).sqrt();
         if n < 50 || rho < DEAD.max(noise) {
-            // Here they have nothing in common but the size of the noise, which may be uneven.
+            // At this lag pixels share only the noise level, which may vary over the picture.
             apart = (n >= 50).then(|| near.product());
             break;
         }
         course.push(rho);
         products.push((rho, near, CLEARLY * noise));
     }
-    // Where the correlation does not die out nothing says what the size alone makes.
+    // Where the correlation never dies out, the effect of the level is unknown: rho^2 is kept.
     squares.extend(products.into_iter().map(|(rho, near, clearly)| {
         let of_gaussian = rho * rho;
         let own = apart.and_then(|apart| near.correlation(apart)).unwrap_or(0.0);
@@ -146,7 +147,7 @@ impl Products {
         (self.products * self.pairs / (self.first * self.second)).max(1.0)
     }
 
-    /// Correlation of the squares, where [`Products::product`] is this of pixels far apart.
+    /// Correlation of the squares; `apart` is [`Products::product`] of uncorrelated pixels.
     fn correlation(&self, apart: f64) -> Option<f64> {
         let by_chance = apart * self.first * self.second / self.pairs;
         let own = (self.products - by_chance) / (self.squares - by_chance);
@@ -154,7 +155,7 @@ impl Products {
     }
 }
 
-/// Unit noise that comes through square boxes of `side` px, row by row.
+/// Unit white noise filtered by square boxes of `side` px, row-major.
 #[cfg(test)]
 pub fn noise_through_boxes(
     [width, height]: [usize; 2],
@@ -183,13 +184,13 @@ mod tests {
         (0..width * height).map(|_| StandardNormal.sample(&mut rng)).collect()
     }
 
-    /// Noise of 400 x 300 px that comes through square windows of `side` px.
+    /// White noise of 400 x 300 px filtered by square windows of `side` px.
     fn blurred(side: usize) -> Vec<f32> {
         let noise = noise_through_boxes([400, 300], side, &mut Seed(4).stream("blurred"));
         noise.into_iter().map(|r| r as f32).collect()
     }
 
-    /// The sum of rho^2.
+    /// Sum of rho^2 over all lags.
     fn of_gaussian(c: &Correlation) -> f64 {
         let along = |c: &[f64]| 1.0 + 2.0 * c[1..].iter().map(|rho| rho * rho).sum::<f64>();
         along(&c.along_u) * along(&c.along_v)
@@ -213,8 +214,8 @@ mod tests {
         assert!(!c.persists);
     }
 
-    /// Every pixel four times: four make one sample, of a mean and of a variance, where rho^2 alone has nine
-    /// quarters. Size that changes over the picture makes no pixel a copy.
+    /// Every pixel repeated four times: four make one sample of a mean and of a variance; rho^2 alone would
+    /// say 9/4. A varying noise level makes no pixel a copy.
     #[test]
     fn copies_are_no_samples() {
         let (width, half) = (400, white(200, 150));
@@ -231,7 +232,7 @@ mod tests {
         assert_eq!(c.sum_of_squares, of_gaussian(&c));
     }
 
-    /// An error of 24 x 24 px that stands still, ten times the mean's noise, is not the noise's.
+    /// A static error of 24 x 24 px, 10 high, must not count as correlation of the noise.
     #[test]
     fn a_bump_makes_no_copies() {
         let width = 400;

@@ -1,4 +1,4 @@
-//! Small statistics the pipeline shares.
+//! Small statistics shared by the pipeline.
 
 mod budget;
 mod correlation;
@@ -29,19 +29,19 @@ pub const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 /// Standard deviations at which Tukey's biweight reaches zero: 95 % efficient on Gaussian noise.
 pub const TUKEY: f64 = 4.685;
 
-/// `n` values from one to the other, both among them, in even steps.
+/// `n` evenly spaced values from `low` to `high`, both included.
 pub fn even([low, high]: [f64; 2], n: usize) -> impl Iterator<Item = f64> + Clone {
     (0..n).map(move |k| low + (high - low) * k as f64 / (n - 1) as f64)
 }
 
-/// Least and greatest; infinite and the wrong way round when there are none.
+/// Minimum and maximum; `[INFINITY, NEG_INFINITY]` when there are no values.
 pub fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     values
         .into_iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
 }
 
-/// Where `below` ceases to hold, between two numbers: by fifty bisections, from below and from above.
+/// Brackets the point where `below` turns false, by fifty bisections: its lower and upper bound.
 pub fn bisect([mut low, mut high]: [f64; 2], below: impl Fn(f64) -> bool) -> [f64; 2] {
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
@@ -60,7 +60,7 @@ pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (n > 0.0).then(|| sum / n)
 }
 
-/// Median by selection; NaN when empty. The slice is reordered.
+/// Median by selection, the upper of two middle values; NaN when empty. The slice is reordered.
 pub fn median_in_place(values: &mut [f32]) -> f32 {
     let n = values.len();
     if n == 0 {
@@ -69,7 +69,7 @@ pub fn median_in_place(values: &mut [f32]) -> f32 {
     *values.select_nth_unstable_by(n / 2, f32::total_cmp).1
 }
 
-/// The middle value, or the mean of the two in the middle; NaN of nothing. Reorders `values`.
+/// The middle value, or the mean of the two middle values; NaN when empty. Reorders `values`.
 pub fn median(values: &mut [f64]) -> f64 {
     let n = values.len();
     if n == 0 {
@@ -83,7 +83,7 @@ pub fn median(values: &mut [f64]) -> f64 {
 }
 
 /// The `p`-quantile, 0 to 1, by interpolation between the sorted values (Hyndman and Fan's type 7);
-/// `None` of nothing. Sorts `values`, which hold no NaN.
+/// `None` when empty. Sorts `values`, which must hold no NaN.
 pub fn quantile(values: &mut [f64], p: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let at = p * (values.len().checked_sub(1)?) as f64;
@@ -95,14 +95,14 @@ pub fn quantile(values: &mut [f64], p: f64) -> Option<f64> {
 /// Two-sided quantile of Student's t: P(|T| < q) = `level`.
 pub fn student_quantile(level: f64, degrees_of_freedom: f64) -> f64 {
     let p = 0.5 + 0.5 * level;
-    // Beyond this the two agree to six digits, and the inverse of Student's t takes for ever.
+    // Beyond this the normal quantile agrees to six digits, and inverting Student's t takes for ever.
     if degrees_of_freedom > 1e6 {
         return Normal::standard().inverse_cdf(p);
     }
     StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(f64::NAN, |t| t.inverse_cdf(p))
 }
 
-/// P(|T| < k) of Student's t; `None` are infinite degrees of freedom.
+/// P(|T| < k) of Student's t; `None` means infinite degrees of freedom.
 pub fn student_coverage(k: f64, degrees_of_freedom: Option<f64>) -> f64 {
     let beyond = match degrees_of_freedom.filter(|n| *n < 1e6) {
         None => Normal::standard().sf(k),
@@ -111,12 +111,12 @@ pub fn student_coverage(k: f64, degrees_of_freedom: Option<f64>) -> f64 {
     1.0 - 2.0 * beyond
 }
 
-/// P(T > t) of Student's t; 1 without a degree of freedom.
+/// P(T > t) of Student's t; 1 without degrees of freedom.
 pub fn student_upper(t: f64, degrees_of_freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.0, |law| law.sf(t))
 }
 
-/// Variance of a standard normal kept only within +-`cut`: below one, tends to one.
+/// Variance of a standard normal truncated at +-`cut`: below one, tends to one.
 ///
 /// 1 - 2 k phi(k) / (2 Phi(k) - 1) (Johnson, Kotz and Balakrishnan 1994, section 13.10).
 pub fn normal_cut_factor(cut: f64) -> f64 {
@@ -125,14 +125,14 @@ pub fn normal_cut_factor(cut: f64) -> f64 {
     1.0 - 2.0 * cut * density / inside
 }
 
-/// The root of an unbiased variance with `n` effective samples is low by this factor:
+/// Factor that unbiases the root of an unbiased variance of `n` effective samples:
 /// `E[s] = sigma (1 - 1/(4 n))` to first order.
 pub fn std_unbias(n: f64) -> f64 {
     if n > 1.0 { 1.0 + 1.0 / (4.0 * n) } else { 1.0 }
 }
 
-/// Interval of Clopper and Pearson (1934) for the rate behind `k` successes of `n`: it holds the true
-/// rate with at least the probability `level`. All of [0, 1] when nothing was tried.
+/// Interval of Clopper and Pearson (1934) for the rate behind `k` successes of `n`: it covers the true
+/// rate with a probability of at least `level`. [0, 1] when `n` is 0.
 pub fn clopper_pearson(k: usize, n: usize, level: f64) -> [f64; 2] {
     if n == 0 {
         return [0.0, 1.0];
@@ -167,7 +167,7 @@ pub fn at_least(k: usize, n: usize, p: f64) -> f64 {
 
 /// P(F > f) of Fisher's F with these degrees of freedom.
 pub fn f_upper(f: f64, above: f64, below: f64) -> f64 {
-    // Past a million degrees of freedom the two agree to six digits.
+    // Past a million degrees of freedom the result is the same to six digits.
     let below = below.min(1e6);
     beta(0.5 * below, 0.5 * above, below / (below + above * f.max(0.0)))
 }
@@ -186,7 +186,7 @@ mod tests {
         assert!((student_quantile(0.95, 1e9) - 1.960).abs() < 1e-3);
     }
 
-    /// Table values at 5 %, and at 1 % without an end to the degrees of freedom below.
+    /// Table values at 5 %, at 2.56 %, and at 1 % with infinite degrees of freedom below.
     #[test]
     fn tails_of_f_match_the_tables() {
         for (f, above, below, p) in [(4.965, 1.0, 10.0, 0.05), (2.711, 5.0, 20.0, 0.05)] {
@@ -208,7 +208,7 @@ mod tests {
         assert_eq!(median_in_place(&mut [3.0, 1.0, 2.0]), 2.0);
     }
 
-    /// By hand: value p (n - 1), counted from 0, of the sorted five.
+    /// By hand: the value at index p (n - 1) of the five sorted ones.
     #[test]
     fn quantiles_lie_between_the_sorted_values() {
         let mut values = [7.0, 1.0, 4.0, 2.0, 11.0];
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!(quantile(&mut [], 0.5), None);
     }
 
-    /// The middle is the median, of even and odd numbers.
+    /// For even and odd counts.
     #[test]
     fn the_half_is_the_median() {
         for n in 1..20 {
@@ -246,7 +246,7 @@ mod tests {
         }
     }
 
-    /// 95 % intervals of (found, asked), percent, as tables of the exact binomial have them.
+    /// 95 % intervals (k, n, low, high) in percent, from tables of the exact binomial.
     #[test]
     fn the_intervals_are_those_of_the_table() {
         let rows = [

@@ -1,6 +1,6 @@
-//! How much variance there is beyond what sampling explains (Paule and Mandel 1982).
+//! Variance beyond what sampling explains (Paule and Mandel 1982).
 
-/// Chi-square of the views' means (their squares and variances), and its derivative by tau_view^2.
+/// Chi-square of the views' means, given as (square, variance), and its derivative by tau_view^2.
 pub fn between(means: &[(f64, f64)], tau_view2: f64) -> (f64, f64) {
     means.iter().fold((0.0, 0.0), |(chi2, slope), (square, variance)| {
         let weight = 1.0 / (variance + tau_view2);
@@ -8,20 +8,21 @@ pub fn between(means: &[(f64, f64)], tau_view2: f64) -> (f64, f64) {
     })
 }
 
-/// Relative step at which tau^2 is found: far below any use, far above rounding.
+/// Relative step at which tau^2 has converged: far below any use, far above rounding.
 const ROOT_DIGITS: f64 = 1e-12;
-/// Newton's step takes some ten; from far off it doubles, and a double has a thousand doublings.
+/// Newton's method takes about ten steps. From far off each doubles tau^2, and an `f64` spans a thousand
+/// doublings.
 const MAX_NEWTON_STEPS: usize = 1000;
 
-/// The tau^2 >= 0 at which chi-square (and its slope) is `expected`, or zero where it is less
-/// already. Newton's step: chi-square falls and is convex in tau^2, so from zero the steps never
-/// pass the root (DerSimonian and Kacker 2007).
+/// The tau^2 >= 0 at which chi-square equals `expected`, or zero where it is already less there; `chi2`
+/// returns chi-square and its slope. Newton's method: chi-square is decreasing and convex in tau^2, so
+/// steps from zero never pass the root (DerSimonian and Kacker 2007).
 pub fn paule_mandel(expected: f64, chi2: impl Fn(f64) -> (f64, f64)) -> f64 {
     let mut tau = 0.0;
     for _ in 0..MAX_NEWTON_STEPS {
         let (found, slope) = chi2(tau);
         let step = (expected - found) / slope;
-        // Also where nothing is a number any more: then the last tau stands.
+        // Also stops at NaN and infinity, and keeps the last tau.
         if !(step > ROOT_DIGITS * tau && step.is_finite()) {
             break;
         }
@@ -34,7 +35,7 @@ pub fn paule_mandel(expected: f64, chi2: impl Fn(f64) -> (f64, f64)) -> f64 {
 mod tests {
     use super::*;
 
-    /// The root against its definition, from hardly any excess to a million times too much.
+    /// Checks the root against its definition, from hardly any excess to a factor of a million.
     #[test]
     fn extra_variance_makes_chi_square_what_is_expected() {
         for size in [1.2, 3.0, 1e3, 1e6] {
@@ -50,7 +51,7 @@ mod tests {
         assert_eq!(paule_mandel(12.0, |tau| between(&[(0.01, 0.01); 11], tau)), 0.0);
     }
 
-    /// Nothing that is no number comes back, whatever goes in.
+    /// NaN and infinity in the input never come back.
     #[test]
     fn no_number_in_gives_zero() {
         for square in [f64::NAN, f64::INFINITY] {

@@ -1,14 +1,14 @@
-//! What measurements of several units have in common, and by how much the units scatter.
+//! Random effects: the common value of several units, and the scatter between them.
 
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{paule_mandel, student_quantile};
 
-/// Of all intervals here.
+/// Level of all intervals here.
 const LEVEL: f64 = 0.95;
 
-/// A common value and the scatter of units about it, beyond the errors of their measurements.
+/// A common value and the scatter of units about it, beyond their measurement errors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RandomEffects {
     pub common: f64,
@@ -21,8 +21,8 @@ pub struct RandomEffects {
 }
 
 impl RandomEffects {
-    /// Of (value, variance of its error), a unit each; `None` for fewer than two units, or where a
-    /// variance is not positive.
+    /// Estimates both from (value, variance of its error) of each unit; `None` for fewer than two units, or
+    /// where a variance is not positive.
     ///
     /// The scatter is Paule and Mandel's; its interval inverts the same chi-square (Viechtbauer
     /// 2007). The common value's interval is Knapp and Hartung's (2003), whose factor is one at Paule
@@ -39,8 +39,8 @@ impl RandomEffects {
     }
 }
 
-/// The common value alone, and its standard error; the two make a Student's t with one degree of freedom
-/// less than there are units.
+/// The common value and its standard error, for Student's t with one degree of freedom less than there
+/// are units.
 pub fn common_value(units: &[(f64, f64)]) -> Option<[f64; 2]> {
     let (common, std_error, _) = pooled(units)?;
     Some([common, std_error])
@@ -57,7 +57,7 @@ fn pooled(units: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     Some((common, information.sqrt().recip(), tau2.sqrt()))
 }
 
-/// The variance between units that makes Cochran's Q what is expected.
+/// Variance between units at which Cochran's Q equals `expected`.
 fn scatter2(units: &[(f64, f64)], expected: f64) -> f64 {
     paule_mandel(expected, |tau2| about_mean(units, tau2))
 }
@@ -71,7 +71,7 @@ fn mean(units: &[(f64, f64)], tau2: f64) -> (f64, f64) {
     (sum / weights, weights)
 }
 
-/// Cochran's Q at a variance between units, and its derivative by it.
+/// Cochran's Q at the variance `tau2` between units, and its derivative by it.
 fn about_mean(units: &[(f64, f64)], tau2: f64) -> (f64, f64) {
     let (middle, _) = mean(units, tau2);
     units.iter().fold((0.0, 0.0), |(q, slope), (y, v)| {
@@ -88,8 +88,8 @@ mod tests {
     use rand::Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Intervals hold the truth at their level over 2,000 fleets of six units with unequal errors:
-    /// a binomial's tails at 1 in 1,000 either side.
+    /// Coverage of the intervals over 2,000 fleets of six units with unequal errors, tested by binomial
+    /// tails at 1 in 1,000 on either side.
     #[test]
     fn intervals_cover_common_value_and_scatter() {
         const FLEETS: usize = 2000;
@@ -109,8 +109,8 @@ mod tests {
                 held[1] += usize::from(inside(found.scatter_interval, scatter));
             }
             for (what, k) in ["common", "scatter"].iter().zip(held) {
-                // At most as many misses as the level allows; Knapp and Hartung's floor and the
-                // scatter's border at zero make the intervals wider.
+                // No more misses than the level allows; Knapp and Hartung's floor and the
+                // bound of the scatter at zero widen the intervals.
                 assert!(at_most(k, FLEETS, LEVEL) > 1e-3, "{what} {scatter}: {k} of {FLEETS}");
                 let exact = scatter == 3.0;
                 assert!(!exact || at_least(k, FLEETS, LEVEL) > 1e-3, "{what}: {k} of {FLEETS}");
@@ -124,7 +124,7 @@ mod tests {
         let units = [1.0, 2.0, 3.0, 6.0].map(|y| (y, 0.25));
         let found = RandomEffects::of(&units).unwrap();
         assert!((found.common - 3.0).abs() < 1e-12);
-        // The values' own variance is 14/3.
+        // The sample variance of the values is 14/3.
         assert!((found.scatter.powi(2) - (14.0 / 3.0 - 0.25)).abs() < 1e-9);
     }
 

@@ -2,16 +2,16 @@
 
 use rayon::prelude::*;
 
-/// A summed-area table of `N` numbers a pixel (Crow 1984): sums over any box in four look-ups.
+/// A summed-area table of `N` numbers per pixel (Crow 1984): sums over any box in four look-ups.
 pub struct SummedArea<const N: usize> {
     width: usize,
     height: usize,
-    /// Above and left of each corner, with a row and a column of zeros before the first.
+    /// Sums above and left of each corner, with a row and a column of zeros before the first.
     sums: Vec<[f64; N]>,
 }
 
 impl<const N: usize> SummedArea<N> {
-    /// `of` gives a pixel's numbers, row by row; `None` counts for nothing.
+    /// Sums what `of` returns for each pixel, row-major; `None` counts as zero.
     pub fn of(width: usize, height: usize, of: impl Fn(usize) -> Option<[f64; N]> + Sync) -> Self {
         let across = width + 1;
         let mut sums = vec![[0.0; N]; across * (height + 1)];
@@ -35,14 +35,14 @@ impl<const N: usize> SummedArea<N> {
         SummedArea { width, height, sums }
     }
 
-    /// Over columns `u0..u1` and rows `v0..v1`.
+    /// Sum over columns `u0..u1` and rows `v0..v1`.
     pub fn window(&self, [u0, u1]: [usize; 2], [v0, v1]: [usize; 2]) -> [f64; N] {
         let at = |u: usize, v: usize| &self.sums[v * (self.width + 1) + u];
         let [a, b, c, d] = [at(u1, v1), at(u0, v1), at(u1, v0), at(u0, v0)];
         std::array::from_fn(|k| a[k] - b[k] - c[k] + d[k])
     }
 
-    /// Over the pixels no farther than `reach` from (u, v) along either axis.
+    /// Sum over the pixels within `reach` of (u, v) along either axis.
     pub fn around(&self, u: usize, v: usize, reach: usize) -> [f64; N] {
         let span = |at: usize, end: usize| [at.saturating_sub(reach), (at + reach + 1).min(end)];
         self.window(span(u, self.width), span(v, self.height))

@@ -1,4 +1,4 @@
-//! The shapes a missing term may have: a few kinds, each over coordinates and times a modulation.
+//! Shapes of terms: a few kinds, each over coordinates and times a modulation.
 
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
@@ -7,45 +7,45 @@ use super::series::{
     bilinear, cubic, hat_without_line, interpolated, lens, node, on_ring, powers, waves,
 };
 
-/// A term with everything but its linear coefficients settled. Terms of the bias are in px of
-/// disparity, those of the variance in its natural logarithm.
+/// Everything of a term but its linear coefficients. Terms of the bias are in px of disparity, those of the
+/// variance in its natural logarithm.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Basis {
-    /// The same everywhere.
+    /// Constant.
     Level,
-    /// A coordinate, its square, and so on; with a constant after the first where there is a `level`.
+    /// Powers of a coordinate, from the first on; with `level`, a constant comes second.
     Powers { over: Coordinate, orders: usize, level: bool, times: Modulation },
-    /// Powers of two coordinates together up to a degree, without what is straight.
+    /// Monomials of two coordinates up to a degree, without the constant and linear ones.
     Polynomial { over: [Coordinate; 2], degree: usize, times: Modulation },
     /// Sine and cosine of a period, and their harmonics.
     Waves { over: Coordinate, period: f64, harmonics: usize, times: Modulation },
-    /// Radial distortion, order by order of r^2, of the lens through which a matcher sees both the scene and
-    /// its reference, which was recorded where the disparity is `reference_px`.
+    /// Radial distortion, in orders of r^2, of the lens through which a matcher sees both the scene and its
+    /// reference, which was recorded where the disparity is `reference_px`.
     Lens { fx: f64, fy: f64, reference_px: f64, orders: usize },
-    /// Falls off exponentially from where the coordinate is zero.
+    /// Exponential decay from where the coordinate is zero.
     Decay { over: Coordinate, width: f64 },
-    /// Logarithm of one plus the coordinate: what adds to a variance.
+    /// Logarithm of one plus the coordinate, which adds to a variance.
     Log1p { over: Coordinate },
-    /// Tables over depth and tilt, one a coefficient.
+    /// Tables over depth and tilt, one per coefficient.
     Table { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
-    /// A broken line over an axis between evenly spaced nodes; a lift over the target's own
-    /// coordinates is without its straight part.
+    /// Piecewise linear over an axis, between evenly spaced nodes. A lift over the target's own coordinates
+    /// has its straight part removed.
     Curve { over: Coordinate, low: f64, high: f64, nodes: usize, times: Modulation },
-    /// A broken line on a circle.
+    /// Piecewise linear on a circle.
     Ring { over: Coordinate, period: f64, nodes: usize, times: Modulation },
     /// A bilinear map over the picture.
     Map { width: f64, height: f64, across: usize, down: usize, times: Modulation },
     /// A smooth map over the picture: products of cubic B-splines.
     Spline { width: f64, height: f64, across: usize, down: usize, times: Modulation },
-    /// 1, x and y of the ray: what planes absorb of a shape.
+    /// 1, x and y of the ray: the part of a shape that planes absorb.
     Affine { times: Modulation },
-    /// Two curves at once: a bilinear map over two axes.
+    /// A bilinear map over two axes.
     Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
 }
 
-/// Nodes of a table over z and over theta.
+/// Nodes of a table along z and along theta.
 pub const TABLE: usize = 17;
-/// Powers of two coordinates, without the plane itself, by their degree.
+/// Exponents of the monomials of two coordinates beyond the plane, by degree.
 const BENT: [(usize, usize); 12] = [
     (2, 0),
     (0, 2),
@@ -61,7 +61,7 @@ const BENT: [(usize, usize); 12] = [
     (0, 4),
 ];
 
-/// Its powers from 0 to 4.
+/// Powers of `x` from 0 to 4.
 fn to_fourth(x: f64) -> [f64; 5] {
     let square = x * x;
     [1.0, x, square, x * square, square * square]
@@ -77,18 +77,18 @@ impl Basis {
         Basis::Waves { over, period, harmonics, times: Modulation::One }
     }
 
-    /// The target's surface over its own coordinates, m along its normal.
+    /// Surface of the target over its own coordinates, m along its normal.
     pub const fn relief(degree: usize) -> Self {
         let over = [Coordinate::Right, Coordinate::Down];
         Basis::Polynomial { over, degree, times: Modulation::Lift }
     }
 
-    /// The target's surface where it is round about its middle, m along its normal.
+    /// Surface of a target that is round about its middle, m along its normal.
     pub const fn dome(orders: usize) -> Self {
         Basis::powers(Coordinate::TargetRadiusSquared, orders, Modulation::Lift)
     }
 
-    /// How many linear coefficients it has.
+    /// Number of linear coefficients.
     pub fn count(&self) -> usize {
         match self {
             Basis::Powers { orders, level, .. } => orders + usize::from(*level),
@@ -106,8 +106,8 @@ impl Basis {
         }
     }
 
-    /// The same with no number of orders: of two of one series, the columns of the one with fewer are the
-    /// first ones of the other.
+    /// Same without the number of orders. Of two bases of one series, the columns of the one with fewer are
+    /// the first ones of the other.
     pub fn series(&self) -> Self {
         let mut series = self.clone();
         match &mut series {
@@ -120,7 +120,7 @@ impl Basis {
         series
     }
 
-    /// Tells the columns that may not be zero at a place, number and value.
+    /// Passes index and value of the columns that may be non-zero at a place to `see`.
     pub fn visit(&self, p: &PixelContext, mut see: impl FnMut(usize, f64)) {
         match *self {
             Basis::Level => see(0, 1.0),
@@ -151,7 +151,7 @@ impl Basis {
                 let (k, t) = node(over.value(p), low, high, nodes);
                 let scale = times.value(p);
                 if self.is_lift_of_target() {
-                    // Of its columns none is nothing: the straight part is taken out.
+                    // No column is zero, since the straight part is removed.
                     let weight = |j| hat_without_line(j, k as f64 + t, nodes);
                     (0..nodes).for_each(|j| see(j, scale * weight(j)));
                 } else {
@@ -189,7 +189,7 @@ impl Basis {
         }
     }
 
-    /// The columns at a place; `out` has [`Basis::count`] entries.
+    /// Fills in the columns at a place; `out` has [`Basis::count`] entries.
     pub fn fill(&self, p: &PixelContext, out: &mut [f64]) {
         out.fill(0.0);
         self.visit(p, |k, g| out[k] += g);

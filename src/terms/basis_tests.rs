@@ -1,4 +1,4 @@
-//! What each shape is at places where it is known.
+//! Known values of each shape.
 
 use super::*;
 
@@ -17,8 +17,8 @@ fn places() -> impl Iterator<Item = PixelContext> {
     })
 }
 
-/// A shape with a number at each node that is a straight line over the nodes is that line between them, too:
-/// so the weights sum to one, and each is at its place.
+/// Node values on a straight line give that line between the nodes too, so the weights sum to one and each is
+/// at its place.
 #[test]
 fn between_the_nodes_of_a_line_is_the_line() {
     let (width, height) = (640.0, 480.0);
@@ -27,7 +27,8 @@ fn between_the_nodes_of_a_line_is_the_line() {
     let spline = Basis::Spline { width, height, across: 5, down: 4, times: TIMES };
     let over = [OVER, Coordinate::Row];
     let pair = Basis::Pair { over, low: [5.0, 0.0], high: [60.0, 479.0], nodes: [3, 6] };
-    // Nodes across, and the steps between the first and the last that count: of a spline's, those within.
+    // Nodes across, steps between the first and the last that count (a spline's: inside the picture), columns
+    // seen.
     let shapes = [(curve, 7, [6.0, 1.0], 2), (map, 5, [4.0, 3.0], 4), (spline, 5, [2.0, 1.0], 16)];
     for (basis, across, [right, down], few) in shapes.into_iter().chain([(pair, 3, [2.0, 5.0], 4)])
     {
@@ -42,7 +43,7 @@ fn between_the_nodes_of_a_line_is_the_line() {
                 }
                 _ => unreachable!(),
             };
-            // The first of a spline's nodes is a step before the picture.
+            // A spline's first node is a step before the picture.
             let before = if matches!(basis, Basis::Spline { .. }) { 1.0 } else { 0.0 };
             let expected = scale * (0.3 + 0.7 * (right * x + before) - 1.1 * (down * y + before));
             let value = basis.value(&line, &p);
@@ -54,7 +55,7 @@ fn between_the_nodes_of_a_line_is_the_line() {
     }
 }
 
-/// A board that is moved and tilted as a whole is where it was.
+/// Moving and tilting a board as a whole changes nothing.
 #[test]
 fn a_lift_has_no_straight_part() {
     let basis = Basis::Curve {
@@ -77,7 +78,7 @@ fn a_lift_has_no_straight_part() {
     assert!(basis.value(&line, &place).abs() < 1e-10);
 }
 
-/// A ring closes; a table is its numbers; powers have their constant second.
+/// A ring closes; a table returns its numbers; powers have their constant second.
 #[test]
 fn known_values() {
     let ring = Basis::Ring { over: OVER, period: 3.0, nodes: 5, times: Modulation::One };

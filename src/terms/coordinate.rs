@@ -1,4 +1,4 @@
-//! What a shape runs over: a number of the place that is measured.
+//! Coordinates that a shape runs over: numbers of the measured place.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,9 +54,9 @@ pub enum Coordinate {
     Ambient(f64),
 }
 
-/// Light on the desk of an office (EN 12464-1), lx: what a room's share of the light is counted at.
+/// Illuminance on an office desk (EN 12464-1), lx: the unit of the room's light.
 pub const ROOM_LUX: f64 = 500.0;
-/// No surface is darker, of the recording's median.
+/// Darkest surface, relative to the recording's median.
 pub const DARKEST: f64 = 1e-2;
 
 impl Coordinate {
@@ -137,8 +137,8 @@ impl Coordinate {
         }
     }
 
-    /// Does a shape over it stand still in the picture? What follows the ray is geometry, and the
-    /// same for every camera.
+    /// Whether a shape over it is fixed in the picture. What follows the ray is geometry, and the same for
+    /// every camera.
     pub(super) fn is_of_picture(self) -> bool {
         matches!(
             self,
@@ -146,14 +146,14 @@ impl Coordinate {
         )
     }
 
-    /// Is it depth or tilt, as sigma is a function of?
+    /// Whether it is depth or tilt, which sigma is a function of.
     pub(super) fn is_of_sigma(self) -> bool {
         matches!(self, Coordinate::Theta | Coordinate::TiltBlur(_))
             || matches!(self.alone(), Some(Coordinate::Disparity))
             || matches!(self, Coordinate::LogRatio(_) | Coordinate::DepthPower { .. })
     }
 
-    /// The coordinate that groups of samples of one value are made by.
+    /// Coordinate by which samples of one value are grouped.
     pub(super) fn alone(self) -> Option<Coordinate> {
         match self {
             Coordinate::Column | Coordinate::Row | Coordinate::Edge => Some(self),

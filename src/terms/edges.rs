@@ -1,18 +1,18 @@
-//! How far pixels are from the edge of the target.
+//! Distances of pixels from the edge of the target.
 
-/// Steps of the 3-4 chamfer (Borgefors 1986), px: straight, and across a corner.
+/// Steps of the 3-4 chamfer distance (Borgefors 1986), px: straight, and diagonal.
 const STRAIGHT: f32 = 1.0;
 const ACROSS: f32 = 4.0 / 3.0;
 
-/// Distance of each pixel of the target to the nearest that is not the target's, px; zero off the
-/// target. The picture's border is no edge.
+/// Distance of each pixel of the target to the nearest pixel off it, px; zero off the target. The picture's
+/// border is no edge.
 pub fn edge_distances(on_target: &[bool], width: usize) -> Vec<f32> {
     if on_target.is_empty() {
         return Vec::new();
     }
     let height = on_target.len() / width.max(1);
     let far = (width + height) as f32;
-    // A frame of pixels around the picture from which nothing is near.
+    // Frame the picture in pixels that are far from any edge.
     let across = width + 2;
     let mut framed = vec![far; across * (height + 2)];
     for (line, on) in framed.chunks_exact_mut(across).skip(1).zip(on_target.chunks_exact(width)) {
@@ -39,7 +39,7 @@ pub fn edge_distances(on_target: &[bool], width: usize) -> Vec<f32> {
     lines.flat_map(|line| &line[1..=width]).copied().collect()
 }
 
-/// What the line before lets a line be at most, inside the frame.
+/// Lowers a line's distances to what the line before allows, inside the frame.
 fn from_line(before: &[f32], line: &mut [f32]) {
     for (d, near) in line[1..].iter_mut().zip(before.windows(3)) {
         let across = near[0].min(near[2]) + ACROSS;

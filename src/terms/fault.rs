@@ -1,4 +1,4 @@
-//! What can be wrong with a term that comes from a file.
+//! Checks of a term that comes from a file.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -9,20 +9,20 @@ use super::{Statistic, Term};
 use crate::frame::FARTHEST_M;
 use crate::units::shortest;
 
-/// Nodes along one axis, and harmonics or orders of a series: more than any fit has; a file that
-/// asks for more is damaged, and would be believed with memory.
+/// Most nodes along one axis, and harmonics or orders of a series: more than any fit has. A file that asks
+/// for more is damaged, and believing it would cost memory.
 const MAX_NODES: usize = 4096;
 const MAX_ORDERS: usize = 16;
-/// Of a polynomial of two coordinates.
+/// Degrees of a polynomial of two coordinates.
 const DEGREES: std::ops::RangeInclusive<usize> = 2..=4;
 
-/// Ends and periods of axes, in their units: four months in s, more than anything else has.
+/// Largest end or period of an axis, in its unit: four months in s, more than any other axis has.
 const MAX_END: f64 = 1e7;
-/// Periods and widths: finer ones are between two samples of any axis.
+/// Smallest period or width; a finer one lies between two samples of any axis.
 const MIN_PERIOD: f64 = 1e-4;
-/// Of series, whose coefficients have the units of their orders. Fits have up to some thousands.
+/// Largest coefficient of a series, in the units of its order. Fits reach some thousands.
 const MAX_COEFFICIENT: f64 = 1e6;
-/// Depths that a shape may be about, m.
+/// Depths for a shape's pivot or unit, m.
 const PIVOT_M: [f64; 2] = [1e-2, FARTHEST_M];
 const BLUR_PX: [f64; 2] = [1e-6, 1e4];
 /// Of the room's light: a sensor that sees nothing else at a thousandth of an office's.
@@ -31,13 +31,13 @@ const MAX_POWER: f64 = 16.0;
 const FOCAL_PX: [f64; 2] = [1.0, 1e6];
 const PICTURE_PX: [f64; 2] = [2.0, 65_536.0];
 
-/// More than any image is wide.
+/// Largest bias, px: wider than any image.
 const MAX_BIAS_PX: f64 = 1e4;
 /// A standard deviation three million times as large.
 const MAX_NEPERS: f64 = 30.0;
 
 impl Term {
-    /// What is wrong with it, if anything.
+    /// Returns what is wrong with it, if anything.
     pub fn fault(&self) -> Option<String> {
         if !matches!(self.statistic, Statistic::Bias | Statistic::Variance) {
             return Some("a shape is a bias or a variance".into());
@@ -53,7 +53,8 @@ impl Term {
             .or_else(|| self.absurd())
     }
 
-    /// Where coefficients are values at nodes, they are errors of disparity or logarithms of a variance.
+    /// Checks the size of the coefficients; values at nodes are errors of disparity or logarithms of a
+    /// variance.
     fn absurd(&self) -> Option<String> {
         let (max, unit) = match self.statistic {
             _ if !self.basis.has_nodes() => (MAX_COEFFICIENT, "in its units"),
@@ -80,7 +81,7 @@ impl Basis {
         )
     }
 
-    /// What is wrong with the numbers that settle it, if anything.
+    /// Returns what is wrong with its parameters, if anything.
     pub fn fault(&self) -> Option<String> {
         let places = self.over().into_iter().flatten().find_map(Coordinate::fault);
         places.or_else(|| self.times().fault()).or_else(|| self.own_fault())

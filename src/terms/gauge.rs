@@ -1,4 +1,4 @@
-//! What planes absorb of a shape that stands still in the picture.
+//! Gauge of a shape fixed in the picture: the part of it that planes absorb.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,30 +7,30 @@ use super::modulation::Modulation;
 use super::pixels::Pixels;
 use super::place::PixelContext;
 
-/// A shape's affine part over the whole picture, which every plane takes up: no fit to planes tells
-/// how large it is.
+/// Affine part of a shape over the whole picture. Every plane absorbs it, so no fit to planes determines its
+/// size.
 #[derive(Debug, Clone)]
 pub struct Gauge {
-    /// What the shape grows with.
+    /// Modulation of the shape.
     pub(crate) times: Modulation,
-    /// Of 1, x and y of the ray, a column of the shape each.
+    /// Coefficients of 1, x and y of the ray, for each column of the shape.
     pub affine: Vec<[f64; 3]>,
 }
 
 impl Gauge {
-    /// `None` for shapes that do not stand still in the picture, and for those that are nothing on
+    /// Returns the gauge; `None` for shapes that are not fixed in the picture, and for those that vanish on
     /// the optical axis by their physics.
     pub fn of(basis: &Basis, pixels: &Pixels<'_>) -> Option<Self> {
         let times = Modulation::still(basis.still_power()?);
         Some(Gauge { times, affine: affine_parts(basis, pixels, |place| place)? })
     }
 
-    /// Is the affine part a plane's own, at any distance?
+    /// Whether the affine part is a plane's own, at any distance.
     pub fn is_plane(&self) -> bool {
         self.times == Modulation::One
     }
 
-    /// Take the affine part out of the shape's columns.
+    /// Subtracts the affine part from the shape's columns.
     pub fn take_out(&self, p: &PixelContext, columns: &mut [f64]) {
         let far = self.times.value(p);
         for (g, [a, b, c]) in columns.iter_mut().zip(&self.affine) {
@@ -38,7 +38,7 @@ impl Gauge {
         }
     }
 
-    /// The same as a term beside the shape's own.
+    /// Same, as a separate term.
     pub fn term(&self, coefficients: &[f64]) -> (Basis, [f64; 3]) {
         let mut sum = [0.0; 3];
         for (beta, affine) in coefficients.iter().zip(&self.affine) {
@@ -48,8 +48,8 @@ impl Gauge {
     }
 }
 
-/// Of 1, x and y of the ray, a column each: what they make of the shape over the whole picture, by least
-/// squares. `at` says where it is looked at.
+/// Least-squares coefficients of 1, x and y of the ray for each column, over the whole picture. `at` gives
+/// the place where the shape is evaluated.
 pub fn affine_parts(
     basis: &Basis,
     pixels: &Pixels<'_>,
@@ -75,7 +75,7 @@ mod tests {
     use crate::simulate::kinect_v1;
     use crate::terms::Coordinate;
 
-    /// With its gauge a shape has no affine part, and another affine part is none.
+    /// With its gauge subtracted a shape has no affine part, and an affine shape vanishes.
     #[test]
     fn what_planes_absorb_is_taken_out() {
         let sensor = kinect_v1(4);

@@ -52,7 +52,7 @@ pub struct Term {
 }
 
 impl Statistic {
-    /// As files write it.
+    /// Name in files.
     pub fn id(self) -> &'static str {
         match self {
             Statistic::Bias => "bias",
@@ -64,8 +64,8 @@ impl Statistic {
     }
 }
 
-/// Numbers that were written one term after the other, one a coefficient, term by term; fewer numbers
-/// leave the last terms without.
+/// Splits numbers written one after the other, one per coefficient, by term. With fewer numbers, the last
+/// terms go without.
 pub fn by_term<'a>(
     terms: &'a [Term],
     numbers: &'a [f64],
@@ -79,28 +79,28 @@ pub fn by_term<'a>(
 }
 
 impl Term {
-    /// Of the disparity, px.
+    /// Bias of the disparity, px.
     pub fn bias(basis: Basis, coefficients: Vec<f64>) -> Self {
         Term { statistic: Statistic::Bias, basis, coefficients }
     }
 
-    /// The same shape, larger by `factor`.
+    /// Same shape, scaled by `factor`.
     pub fn times(&self, factor: f64) -> Self {
         let coefficients = self.coefficients.iter().map(|c| factor * c).collect();
         Term { coefficients, ..self.clone() }
     }
 
-    /// At a place, px or nepers of variance.
+    /// Value at a place, px or nepers of variance.
     pub fn value(&self, p: &PixelContext) -> f64 {
         self.basis.value(&self.coefficients, p)
     }
 
-    /// Of all these terms together.
+    /// Sum of these terms at a place.
     pub fn sum(terms: &[Term], p: &PixelContext) -> f64 {
         terms.iter().map(|t| t.value(p)).sum()
     }
 
-    /// Of the logarithm of its variance.
+    /// Of the log variance of the disparity.
     pub fn variance(basis: Basis, coefficients: Vec<f64>) -> Self {
         Term { statistic: Statistic::Variance, basis, coefficients }
     }

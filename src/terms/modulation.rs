@@ -1,4 +1,4 @@
-//! What a shape is multiplied by.
+//! Factors that a shape is multiplied by.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::needs::Needs;
 use super::place::PixelContext;
 
-/// Disparity at which a term that grows with a power of it is in px: a Kinect at 1.1 m.
+/// Disparity at which a term that grows with a power of the disparity is in px: a Kinect at 1.1 m.
 pub const DISPARITY_UNIT_PX: f64 = 40.0;
 
 /// A factor that changes from place to place.
@@ -35,14 +35,14 @@ pub enum Modulation {
     },
 }
 
-/// What a shape that grows with this power of the disparity is multiplied by at a disparity, px.
+/// Factor of a shape that grows with this power of the disparity, at a disparity in px.
 pub(crate) fn disparity_power(power: f64, disparity: f64) -> f64 {
     let x = disparity / DISPARITY_UNIT_PX;
     if power == 2.0 { x * x } else { x.powf(power) }
 }
 
 impl Modulation {
-    /// The largest square of a slope, at 80 degrees: Nguyen, Izadi and Lovell 2012 see nothing beyond.
+    /// Largest squared slope, at 80 degrees: Nguyen, Izadi and Lovell 2012 see nothing beyond.
     pub const STEEPEST: f64 = 32.2;
 
     /// A power of the disparity.
@@ -54,7 +54,7 @@ impl Modulation {
         }
     }
 
-    /// The same, with the square multiplied out.
+    /// Same, with the square multiplied out.
     pub fn still(disparity_power: f64) -> Self {
         if disparity_power == 2.0 {
             Modulation::DisparitySquared
@@ -91,7 +91,7 @@ impl Modulation {
         }
     }
 
-    /// The power of the disparity that it is, in its units.
+    /// Power of the disparity that it is, in its units.
     pub fn power_of_disparity(self) -> Option<f64> {
         match self {
             Modulation::One => Some(0.0),

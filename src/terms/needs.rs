@@ -1,21 +1,21 @@
-//! What must be known of a place before a term can be evaluated there.
+//! Quantities that must be known at a place to evaluate a term there.
 
 use super::Term;
 
-/// What a term looks at beside the pixel's place in the picture.
+/// What a term depends on besides the pixel's place in the picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Depth or disparity.
     pub depth: bool,
     /// Slope of the surface in disparity.
     pub slope: bool,
-    /// Its tilt, azimuth or distance.
+    /// Tilt, azimuth or distance of the surface.
     pub tilt: bool,
-    /// Coordinates on the calibration target, or the way to its edge.
+    /// Coordinates on the calibration target, or the distance to its edge.
     pub board: bool,
     pub session: bool,
     pub temperature: bool,
-    /// How light the surface is in infrared.
+    /// Brightness of the surface in infrared.
     pub light: bool,
 }
 
@@ -46,7 +46,7 @@ impl Needs {
         }
     }
 
-    /// Of all terms together.
+    /// Needs of all terms together.
     pub fn of<'a>(terms: impl IntoIterator<Item = &'a Term>) -> Needs {
         terms.into_iter().fold(Needs::PIXEL, |needs, term| needs.and(term.needs()))
     }

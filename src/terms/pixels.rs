@@ -1,4 +1,4 @@
-//! Places of single pixels, of whatever they look at.
+//! Places of single pixels, whatever they look at.
 
 use super::modulation::DISPARITY_UNIT_PX;
 use super::place::{PixelContext, corner_radius};
@@ -20,8 +20,8 @@ impl<'a> Pixels<'a> {
         Pixels { camera, rays, scale_px_m, corner: corner_radius(camera) }
     }
 
-    /// Where pixel `i` lies in the picture; nothing is known of what it looks at. A single pixel
-    /// has no width over which a ripple would fade.
+    /// Place of pixel `i` in the picture; nothing is known of what it looks at. A single pixel has no width
+    /// over which a ripple would average out.
     pub fn place(&self, i: usize) -> PixelContext {
         let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
         let (x, y) = self.rays.at(i);
@@ -40,11 +40,11 @@ impl<'a> Pixels<'a> {
     }
 }
 
-/// The picture is looked at in pixels so far apart.
+/// Spacing of the sampled pixels.
 const STRIDE: usize = 4;
 
 impl Pixels<'_> {
-    /// Pixels all over the picture, each where a shape that grows with the disparity is in px.
+    /// Pixels sampled over the whole picture, at the disparity where shapes that grow with it are in px.
     pub fn sampled(&self) -> impl Iterator<Item = PixelContext> + '_ {
         let (width, height) = (self.camera.width, self.camera.height);
         let row = move |v: usize| (STRIDE / 2..width).step_by(STRIDE).map(move |u| v * width + u);
@@ -54,13 +54,13 @@ impl Pixels<'_> {
 }
 
 impl PixelContext {
-    /// `self` with a surface of this disparity, px.
+    /// Puts `self` on a surface of this disparity, px.
     pub fn at_disparity(&mut self, disparity: f64, scale_px_m: f64) {
         self.disparity = disparity;
         self.z = scale_px_m / disparity;
     }
 
-    /// `self` on a plane (disparity and depth apart), with all that follows from its slope.
+    /// Puts `self` on a plane, with all that follows from its slope but not disparity and depth.
     pub fn lean_on(&mut self, plane: &Plane, pixels: &Pixels<'_>) {
         let slope = |q: f64, f: f64| pixels.scale_px_m * q / f;
         self.slope = [slope(plane.q.x, pixels.camera.fx), slope(plane.q.y, pixels.camera.fy)];

@@ -1,4 +1,4 @@
-//! Where a measurement lies, on every axis that a mismatch may follow.
+//! Place of a measurement, along every axis that a mismatch may follow.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::Camera;
 use crate::stats::range;
 
-/// Cosine of the tilt of a plane that is not seen any more.
+/// Cosine of the tilt at which a plane is no longer seen.
 pub(super) const FLATTEST: f64 = 0.05;
 
 /// The axes along which a mismatch is located (`crate::docs::catalogue`).
@@ -36,7 +36,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// In words, id, unit.
+    /// Description, id and unit.
     const fn names(self) -> [&'static str; 3] {
         match self {
             Axis::Z => ["distance from the sensor", "z", "m"],
@@ -58,12 +58,12 @@ impl Axis {
         }
     }
 
-    /// As a sentence calls it, after "the".
+    /// Description, as it follows "the" in a sentence.
     pub fn in_words(self) -> &'static str {
         self.names()[0]
     }
 
-    /// As `diagnosis.json` writes it.
+    /// Name in `diagnosis.json`.
     pub fn id(self) -> &'static str {
         self.names()[1]
     }
@@ -80,15 +80,15 @@ impl std::fmt::Display for Axis {
     }
 }
 
-/// Where a patch (or a pixel) of a plane lies.
+/// Place of a patch (or a pixel) of a plane.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PixelContext {
-    /// Column and row of the patch's middle, px.
+    /// Column and row of the patch's centre, px.
     pub u: f64,
     pub v: f64,
     /// Side of the patch, px.
     pub side: f64,
-    /// Ray of the middle.
+    /// Ray of the centre.
     pub x: f64,
     pub y: f64,
     /// Disparity and depth of the plane, px and m.
@@ -96,40 +96,40 @@ pub struct PixelContext {
     pub z: f64,
     /// Disparity gradient of the plane along u and v, px per px.
     pub slope: [f64; 2],
-    /// From the principal point over the farthest corner's, 0 to 1.
+    /// Distance from the principal point over that of the farthest corner, 0 to 1.
     pub radius: f64,
-    /// On the target: right and down of its centroid, m.
+    /// Position on the target: right and down of its centroid, m.
     pub right: f64,
     pub down: f64,
     /// Distance of the plane from the camera, m.
     pub rho: f64,
-    /// To the nearest pixel off the target inside the picture, px.
+    /// Distance to the nearest pixel off the target inside the picture, px.
     pub edge: f64,
     /// Tilt and its direction, rad.
     pub theta: f64,
     pub azimuth: f64,
-    /// Since the first view, s.
+    /// Time since the first view, s.
     pub session_s: f64,
-    /// Degrees Celsius; 0 where it is not known.
+    /// Temperature, degrees Celsius; 0 where unknown.
     pub temperature_c: f64,
-    /// How light the surface is in infrared over the recording's median; 1 where there is none.
+    /// Brightness of the surface in infrared over the recording's median; 1 where there is no infrared.
     pub light: f64,
-    /// Ambient light, lx; 0 where it is not known.
+    /// Ambient light, lx; 0 where unknown.
     pub ambient: f64,
     /// Model's variance of a pixel's disparity, px^2.
     pub variance: f64,
 }
 
-/// The mean of what a function gives for the members of a group.
+/// Mean of a function over the members of a group.
 pub type GroupMean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
 
 impl PixelContext {
-    /// How much weaker the projected pattern's light comes back than from a target faced at 1 m.
+    /// Factor by which the projected pattern's light comes back weaker than from a frontal target at 1 m.
     pub fn pattern_fall_off(&self) -> f64 {
         self.z * self.z * (1.0 + self.x * self.x + self.y * self.y) / self.theta.cos().max(FLATTEST)
     }
 
-    /// Move to the mean of the members' places; what is one for the view stays.
+    /// Moves to the mean of the members' places; what is common to the view stays.
     pub fn average(&mut self, all: &[PixelContext], mean: &GroupMean<'_>) {
         self.u = mean(&|i| all[i].u);
         self.v = mean(&|i| all[i].v);
@@ -146,7 +146,7 @@ impl PixelContext {
     }
 }
 
-/// Of the farthest corner from the principal point, px.
+/// Distance of the farthest corner from the principal point, px.
 pub fn corner_radius(camera: &Camera) -> f64 {
     let (right, bottom) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);
     [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
@@ -155,7 +155,7 @@ pub fn corner_radius(camera: &Camera) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Least and greatest of each axis.
+/// Least and greatest value on each axis.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Extent {
     pub column: [f64; 2],
@@ -190,7 +190,7 @@ impl Extent {
         }
     }
 
-    /// Does the light differ by enough to see what goes with it?
+    /// Whether the light varies enough to show what depends on it.
     pub fn is_unevenly_lit(&self) -> bool {
         self.light[1] > 1.05 * self.light[0]
     }

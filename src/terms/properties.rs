@@ -1,4 +1,4 @@
-//! What follows for a shape from its coordinates and its modulation.
+//! Properties of a shape that follow from its coordinates and modulation.
 
 use super::basis::Basis;
 use super::coordinate::Coordinate;
@@ -8,7 +8,7 @@ use super::place::Axis;
 use super::{Statistic, Term};
 
 impl Basis {
-    /// What it runs over, the first before the second.
+    /// Coordinates it runs over, in order.
     pub(super) fn over(&self) -> [Option<Coordinate>; 2] {
         match self {
             Basis::Level => [None, None],
@@ -46,7 +46,7 @@ impl Basis {
         self.over().into_iter().flatten().all(what)
     }
 
-    /// The axis that it runs along.
+    /// Axis that it runs along.
     pub fn axis(&self) -> Axis {
         match (self.over(), self.period()) {
             ([Some(Coordinate::Disparity), None], Some(_)) => Axis::DisparityPhase,
@@ -56,7 +56,7 @@ impl Basis {
         }
     }
 
-    /// After which it comes again.
+    /// Period, if it is periodic.
     pub fn period(&self) -> Option<f64> {
         match self {
             Basis::Waves { period, .. } | Basis::Ring { period, .. } => Some(*period),
@@ -64,7 +64,7 @@ impl Basis {
         }
     }
 
-    /// The same with another period, where it has one.
+    /// Same basis with another period, if it is periodic.
     pub fn with_period(&self, new: f64) -> Self {
         let mut basis = self.clone();
         if let Basis::Waves { period, .. } | Basis::Ring { period, .. } = &mut basis {
@@ -73,7 +73,8 @@ impl Basis {
         basis
     }
 
-    /// Does it depend on one coordinate of a view alone, and change too fast along it for patches?
+    /// Coordinate it depends on, if that is one of a view's alone and it changes too fast along it for
+    /// patches.
     pub fn alone(&self) -> Option<Coordinate> {
         let smooth = matches!(self, Basis::Powers { .. } | Basis::Log1p { .. });
         match self.over() {
@@ -82,24 +83,24 @@ impl Basis {
         }
     }
 
-    /// Does it stand still in the picture, but for its size?
+    /// Whether it is fixed in the picture, apart from its size.
     pub fn is_of_picture(&self) -> bool {
         *self != Basis::Level && self.is_all(Coordinate::is_of_picture)
     }
 
-    /// The power of the disparity with which a shape grows that is otherwise the same in every
-    /// picture, whatever it shows. What comes again and again has next to no affine part.
+    /// Power of the disparity with which a shape grows that is otherwise fixed in the picture. `None` for
+    /// periodic shapes, which have next to no affine part.
     pub fn still_power(&self) -> Option<f64> {
         self.power_in_picture().filter(|_| self.period().is_none())
     }
 
-    /// The same power, of shapes that come again and again, too.
+    /// Same power, of periodic shapes too.
     pub fn power_in_picture(&self) -> Option<f64> {
         self.times().power_of_disparity().filter(|_| self.is_of_picture())
     }
 
-    /// Is it nothing on the optical axis, by its physics? (A matcher's lens is, too, but for where its
-    /// reference was recorded, which no fit tells well.)
+    /// Whether it vanishes on the optical axis by its physics. (So does a matcher's lens, apart from where
+    /// its reference was recorded, which no fit determines well.)
     pub fn is_nothing_ahead(&self) -> bool {
         matches!(
             self,
@@ -107,31 +108,31 @@ impl Basis {
         )
     }
 
-    /// Is it a polynomial about the principal point, without a constant?
+    /// Whether it is a polynomial about the principal point, without a constant.
     pub fn is_bowl(&self) -> bool {
         matches!(self, Basis::Powers { over: Coordinate::RadiusSquared, .. })
     }
 
-    /// Does it say no more than a sigma over depth and tilt can?
+    /// Whether a sigma over depth and tilt can express it.
     pub fn is_of_sigma(&self) -> bool {
         let plain = self.times() == Modulation::One && self.period().is_none();
         plain && self.is_all(Coordinate::is_of_sigma)
     }
 
-    /// Is it a shape of the target's surface over the target's own coordinates?
+    /// Whether it is a shape of the target's surface over the target's own coordinates.
     pub(super) fn is_lift_of_target(&self) -> bool {
         let Basis::Curve { over, times, .. } = self else { return false };
         *times == Modulation::Lift && over.axis() == Axis::TargetPosition
     }
 
-    /// Does it change within a few pixels?
+    /// Whether it changes within a few pixels.
     pub fn is_fine(&self) -> bool {
         let over = self.over()[0];
         over == Some(Coordinate::Edge)
             || self.period().is_some() && !over.is_some_and(Coordinate::is_of_picture)
     }
 
-    /// Is it to be fitted on the smallest patches there are? What is printed on a target may be as small.
+    /// Whether it must be fitted on the smallest patches; what is printed on a target may be as small.
     pub fn needs_tiles(&self) -> bool {
         let printed = self.over()[0] == Some(Coordinate::Light);
         self.is_fine() || self.alone().is_some() || printed
@@ -146,18 +147,18 @@ impl Term {
         Needs { depth: needs.depth || matches!(self.basis, Basis::Lens { .. }), ..needs }
     }
 
-    /// Is it the sensor's, so that it can be taken out of any picture? A board's shape is not.
+    /// Whether it is the sensor's and can be subtracted from any picture. A board's shape is not.
     pub fn belongs_to_sensor(&self) -> bool {
         !matches!(self.basis.axis(), Axis::TargetPosition | Axis::EdgeDistance)
     }
 
-    /// Is it a bias that can be taken out of a picture of anything?
+    /// Whether it is a bias that can be subtracted from a picture of anything.
     pub fn is_sensor_bias(&self) -> bool {
         // A curve over two axes belongs to the board when either is the board's.
         self.statistic == Statistic::Bias && self.belongs_to_sensor() && !self.needs().board
     }
 
-    /// Is it a bias that depth images alone tell enough to take out?
+    /// Whether it is a bias that depth images alone suffice to subtract.
     pub fn is_correctable(&self) -> bool {
         self.is_sensor_bias() && !self.needs().light
     }

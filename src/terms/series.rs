@@ -1,5 +1,5 @@
-//! Powers, waves, broken lines without their straight part, and values between nodes: straight, bilinear
-//! and cubic.
+//! Evaluates powers, waves, piecewise-linear curves without their straight part, and linear, bilinear and
+//! cubic interpolation.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,8 +7,7 @@ use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::place::PixelContext;
 
-/// `base` times `scale`, its square, and so on, `orders` of them; `scale` itself after the first where there
-/// is a level.
+/// `scale` times `base`, its square, and so on, `orders` of them; with `level`, `scale` itself comes second.
 pub(super) fn powers(
     [scale, base]: [f64; 2],
     orders: usize,
@@ -25,8 +24,8 @@ pub(super) fn powers(
     }
 }
 
-/// A spot at (x, y) is seen at (x, y) (1 + k r^2n). Its pixel then shows the disparity of another ray, and its
-/// shift against the reference is larger in the ratio in which x (1 + k r^2n) grows with x.
+/// Columns of a lens. A spot at (x, y) is seen at (x, y) (1 + k r^2n). Its pixel then shows the disparity of
+/// another ray, and its shift against the reference is scaled by the derivative of x (1 + k r^2n) by x.
 pub(super) fn lens(
     [fx, fy]: [f64; 2],
     reference_px: f64,
@@ -45,8 +44,8 @@ pub(super) fn lens(
     }
 }
 
-/// Sine and cosine of a coordinate's phase and of its multiples. A patch sees the mean over what it spans of
-/// the coordinate.
+/// Sine and cosine of a coordinate's phase and of its multiples, averaged over the patch's span of the
+/// coordinate.
 pub(super) fn waves(
     (over, period, harmonics): (Coordinate, f64, usize),
     scale: f64,
@@ -64,7 +63,7 @@ pub(super) fn waves(
     }
 }
 
-/// Sine and cosine of an angle; those of its multiples follow.
+/// Sine and cosine of an angle, from which those of its multiples follow.
 #[derive(Clone, Copy)]
 struct Turn {
     sine: f64,
@@ -85,12 +84,11 @@ impl Turn {
     }
 }
 
-/// Columns of stripes are in this unit, px, over their order: so large are bands, and so do the
-/// waves of a saw-tooth fall. A coefficient that few columns of the picture decide is then held to
-/// it.
+/// Unit of the columns of stripes, px, to be divided by their order: bands are this large, and the waves of a
+/// saw-tooth fall off so. A coefficient that few columns of the picture determine is then held to it.
 const STRIPE_PX: f64 = 0.2;
 
-/// What is left of a wave and, call by call, of its harmonics.
+/// Size of a wave over the patch and, call by call, of its harmonics.
 fn seen(over: Coordinate, period: f64, p: &PixelContext) -> impl FnMut() -> f64 {
     let spans = match over {
         Coordinate::Column | Coordinate::Row => [p.side, 0.0],
@@ -107,7 +105,7 @@ fn seen(over: Coordinate, period: f64, p: &PixelContext) -> impl FnMut() -> f64 
     }
 }
 
-/// sin(k x) / (k x) of x = pi `cycles`, for k = 1, 2 and on.
+/// Yields sin(k x) / (k x) for x = pi `cycles` and k = 1, 2, ...
 fn sincs(cycles: f64) -> impl FnMut() -> f64 {
     const NOTHING: f64 = 1e-6;
     let x = PI * cycles;
@@ -121,8 +119,8 @@ fn sincs(cycles: f64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Weight of node `k` at a `place` between the nodes, without what a straight line over the nodes is: a surface
-/// that is moved or tilted as a whole is a plane again, and no fit to planes can tell how far.
+/// Hat function of node `k` at a `place` between the nodes, without its straight line over the nodes: a
+/// surface that is moved or tilted as a whole is a plane again, and no fit to planes can tell how far.
 pub(super) fn hat_without_line(k: usize, place: f64, nodes: usize) -> f64 {
     let (k, n) = (k as f64, nodes as f64);
     let middle = 0.5 * (n - 1.0);
@@ -131,7 +129,7 @@ pub(super) fn hat_without_line(k: usize, place: f64, nodes: usize) -> f64 {
     hat - 1.0 / n - (place - middle) / squares * (k - middle)
 }
 
-/// Number of the node below a value, and the way to the next.
+/// Index of the node below a value, and the fraction of the way to the next.
 pub(super) fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64) {
     let last = (nodes - 1) as f64;
     let place = ((value - low) / (high - low).max(1e-12) * last).clamp(0.0, last);
@@ -139,7 +137,7 @@ pub(super) fn node(value: f64, low: f64, high: f64, nodes: usize) -> (usize, f64
     (k, place - k as f64)
 }
 
-/// The four nodes about a place between those of a map.
+/// Weights of the four nodes of a map about a place.
 pub(super) fn bilinear(
     [(i, s), (j, t)]: [(usize, f64); 2],
     across: usize,
@@ -152,7 +150,7 @@ pub(super) fn bilinear(
     }
 }
 
-/// The value between the nodes of a bilinear map with these values at them.
+/// Bilinear interpolation of a map with these values at its nodes.
 pub(super) fn interpolated(
     nodes: &[f64],
     across: usize,
@@ -163,16 +161,16 @@ pub(super) fn interpolated(
     along(j) * (1.0 - t) + along(j + 1) * t
 }
 
-/// Numbers of the nodes before and after a value on a circle of this period, and the way from one to
-/// the other.
+/// Indices of the nodes before and after a value on a circle of this period, and the fraction of the way
+/// between them.
 pub(super) fn on_ring(value: f64, period: f64, nodes: usize) -> ([usize; 2], f64) {
     let place = (value / period).rem_euclid(1.0) * nodes as f64;
     let k = place as usize % nodes;
     ([k, (k + 1) % nodes], place.fract())
 }
 
-/// Cubic B-splines on `nodes` even places from 0 to `last`: the number of the first of the four that
-/// are not zero at `at`, and their values, which sum to one (de Boor 1978).
+/// Cubic B-splines on `nodes` even places from 0 to `last`: the index of the first of the four that are
+/// non-zero at `at`, and their values, which sum to one (de Boor 1978).
 pub(super) fn cubic(at: f64, last: f64, nodes: usize) -> (usize, [f64; 4]) {
     let spans = nodes - 3;
     let place = (at / last.max(1e-12) * spans as f64).clamp(0.0, spans as f64);
@@ -187,8 +185,8 @@ pub(super) fn cubic(at: f64, last: f64, nodes: usize) -> (usize, [f64; 4]) {
 mod tests {
     use super::*;
 
-    /// What a patch sees of a wave and its harmonics, against the mean over its pixels; what stands
-    /// still in it is seen whole.
+    /// A patch sees the mean of a wave and its harmonics over its pixels; a coordinate that is constant in it
+    /// is seen whole.
     #[test]
     fn a_patch_sees_the_mean_over_what_it_spans() {
         const STEPS: usize = 2000;
@@ -231,7 +229,8 @@ mod tests {
         }
     }
 
-    /// Against the rays themselves: spots of a tilted plane and of the reference, both seen through the lens.
+    /// Compared with the rays themselves: spots of a tilted plane and of the reference, both seen through the
+    /// lens.
     #[test]
     fn a_matcher_behind_a_lens_finds_what_the_columns_say() {
         let (f, scale) = (580.0, 43.5);
@@ -245,7 +244,7 @@ mod tests {
                 let found = |x: f64, y: f64| {
                     let shift = (disparity(x, y) - at_reference) / f;
                     let reference = x - shift;
-                    // The matcher looks along the row; a spot's row is displaced a little, too.
+                    // The matcher searches along the row; the spot's row is displaced a little, too.
                     f * (x * seen(x, y) - reference * seen(reference, y)) + at_reference
                 };
                 let (u, v) = (x * seen(x, y), y * seen(x, y));

@@ -1,5 +1,5 @@
-//! Terms as files write them. The kinds that older files know keep their names and numbers; a
-//! shape that none of them holds is written as it is.
+//! Terms as written in files. Kinds of older files keep their names and numbers; a shape that none of them
+//! holds is written as it is.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -41,7 +41,7 @@ enum Kind {
     Affine { disparity_power: f64 },
     Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
     MatchedLens { fx: f64, fy: f64, reference_px: f64, orders: usize },
-    // Whatever the kinds above do not hold.
+    // Shapes that none of the kinds above holds.
     Powers { over: Coordinate, orders: usize, level: bool, times: Modulation },
     Polynomial { over: [Coordinate; 2], degree: usize, times: Modulation },
     Waves { over: Coordinate, period: f64, harmonics: usize, times: Modulation },
@@ -63,7 +63,7 @@ impl From<Written> for Term {
 }
 
 impl Kind {
-    /// A bowl of the variance that does not change with the disparity is a vignetting.
+    /// A bowl of the variance that does not change with the disparity is written as vignetting.
     fn of(basis: Basis, statistic: Statistic) -> Self {
         use Coordinate as C;
         use Modulation as M;
@@ -152,7 +152,7 @@ impl From<Kind> for Basis {
             Kind::TiltAxis { tilt_power } => {
                 Basis::powers(C::Alignment, 1, M::TiltPower(tilt_power))
             }
-            // The second column is the level: what counts as light is arbitrary.
+            // The second column is the level: the unit of the light is arbitrary.
             Kind::Intensity { orders } => {
                 let (level, times) = (orders > 1, M::One);
                 let orders = orders - usize::from(level);
@@ -198,7 +198,7 @@ mod tests {
 
     use super::*;
 
-    /// As files had them before shapes were made of coordinates.
+    /// Kinds as files had them before shapes were made of coordinates.
     fn known() -> Vec<Value> {
         let table = vec![vec![0.5; 289]];
         vec![
@@ -242,7 +242,7 @@ mod tests {
         assert_eq!(again("variance", &vignetting), vignetting);
     }
 
-    /// What no older kind holds comes back too.
+    /// Shapes that no older kind holds come back too.
     #[test]
     fn other_shapes_are_written_as_they_are() {
         for basis in [

@@ -10,7 +10,7 @@ use crate::io::content_lines;
 use crate::read::read_text;
 use crate::units::shortest;
 
-/// Where a camera was, and when.
+/// A camera pose and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// s.
@@ -21,11 +21,11 @@ pub struct Pose {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     pub poses: Vec<Pose>,
-    /// Lines left out because another line has their time (freiburg2_desk has some).
+    /// Lines dropped because another line has the same time (freiburg2_desk has some).
     pub repeated: usize,
 }
 
-/// A trajectory file in the TUM format.
+/// Formats a trajectory file in the TUM format.
 pub fn tum_text(poses: &[Pose]) -> String {
     let mut text = String::from("# timestamp tx ty tz qx qy qz qw\n");
     for Pose { stamp, world_from_camera } in poses {
@@ -40,10 +40,10 @@ pub fn tum_text(poses: &[Pose]) -> String {
     text
 }
 
-/// Read a trajectory file; lines that begin with `#` are comments. Of lines with one time the first
+/// Reads a trajectory file; lines that begin with `#` are comments. Of lines with equal times the first
 /// counts.
-/// An error, with its line, when it is not eight finite numbers, its quaternion has no length, or
-/// its time is before that of the line above; and when the file holds no pose.
+/// Fails, naming the line, at a line that is not eight finite numbers, whose quaternion has no length, or
+/// whose time is before that of the line above; also if the file holds no pose.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
     let mut read = Trajectory { poses: Vec::new(), repeated: 0 };
     each_line(path, |pose| {
@@ -62,10 +62,10 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
     Ok(read)
 }
 
-/// Read a trajectory file as the scripts of the TUM benchmark do: lines in any order, and of lines
-/// with one time the last counts.
-/// An error, with its line, when it is not eight finite numbers or its quaternion has no length;
-/// and when the file holds no pose.
+/// Reads a trajectory file as the scripts of the TUM benchmark do: lines in any order, and of lines with
+/// equal times the last counts.
+/// Fails, naming the line, at a line that is not eight finite numbers or whose quaternion has no length;
+/// also if the file holds no pose.
 pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
     let mut poses: Vec<Pose> = Vec::new();
     each_line(path, |pose| {
@@ -73,7 +73,7 @@ pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
         Ok(())
     })?;
     let lines = poses.len();
-    // A stable sort: of one time the last stays last, and comes first when read backwards.
+    // The sort is stable: of equal times the last stays last, and comes first after reversing.
     poses.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     poses.reverse();
     poses.dedup_by(|later, kept| later.stamp == kept.stamp);
@@ -95,14 +95,15 @@ fn each_line(path: &Path, mut take: impl FnMut(Pose) -> Result<(), Fault>) -> Re
 
 const REMEDY_FORMAT: &str = "write \"timestamp tx ty tz qx qy qz qw\", one pose a line";
 
-/// Printed quaternions have three to six decimals: one of another length is no rotation.
+/// Lengths of a quaternion that count as a rotation; printed quaternions have three to six decimals.
 const QUATERNION_LENGTH: std::ops::RangeInclusive<f64> = 0.5..=2.0;
-/// Ten times the size of the earth, m: what is farther is damage, and its square has no number.
+/// Farthest place, m: ten times the size of the earth. Anything farther is damage, and its square may
+/// overflow.
 pub(crate) const FARTHEST_PLACE_M: f64 = 1e8;
-/// Three thousand years, s: stamps in ns or us since 1970 are more.
+/// Latest stamp, s: three thousand years. Stamps in ns or us since 1970 are larger.
 const LATEST_S: f64 = 1e11;
 
-/// What is wrong with a line, and what to do.
+/// What is wrong with a line, and its remedy.
 type Fault = (String, &'static str);
 
 fn parse(line: &str) -> Result<Pose, Fault> {
@@ -143,8 +144,8 @@ pub struct Pair {
     pub second: usize,
 }
 
-/// Pairs of stamps closer than `limit`, s: the nearest pair first, each stamp once, in the order of
-/// the first list. Both lists in time order.
+/// Associates stamps that differ by less than `limit`, s: the nearest pair first, each stamp once, in the
+/// order of the first list. Both lists must be in time order.
 ///
 /// ```
 /// use kinoise::trajectory::{associate, Pair};
@@ -155,7 +156,7 @@ pub fn associate(first: &[f64], second: &[f64], limit: f64) -> Vec<Pair> {
     let mut near: Vec<(f64, Pair)> = Vec::new();
     let mut begin = 0;
     for (i, &a) in first.iter().enumerate() {
-        // Inclusive here; what the subtraction below makes of the edges decides.
+        // Inclusive here; the exact comparison below decides at the edges.
         while begin < second.len() && second[begin] < a - limit {
             begin += 1;
         }

@@ -1,4 +1,4 @@
-//! How well a camera's numbers are known.
+//! Uncertainties of a camera's intrinsics.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,20 +21,20 @@ pub struct IntrinsicsUncertainty {
 }
 
 impl IntrinsicsUncertainty {
-    /// Of fx and fy relative to them; nothing where neither is stated.
+    /// Relative uncertainties of fx and fy, 0 for one that is not stated; `None` if neither is.
     pub fn focal_relative(&self, camera: &Camera) -> Option<[f64; 2]> {
         let relative = [self.fx.map(|u| u / camera.fx), self.fy.map(|u| u / camera.fy)];
         relative.iter().any(Option::is_some).then(|| relative.map(|u| u.unwrap_or(0.0)))
     }
 
-    /// Of the principal point as an angle, rad; nothing where neither coordinate is stated.
+    /// Uncertainty of the principal point as angles, rad, 0 for one that is not stated; `None` if neither is.
     pub fn axis_rad(&self, camera: &Camera) -> Option<[f64; 2]> {
         let angles = [self.cx.map(|u| u / camera.fx), self.cy.map(|u| u / camera.fy)];
         angles.iter().any(Option::is_some).then(|| angles.map(|u| u.unwrap_or(0.0)))
     }
 
     pub(super) fn fault(&self, camera: &Camera) -> Option<String> {
-        // One that is as large as the number itself says nothing: a unit was mistaken.
+        // An uncertainty as large as the value (cx, cy: as the image) is meaningless: the unit is wrong.
         let (width, height) = (camera.width as f64, camera.height as f64);
         let stated = [
             ("fx", self.fx, camera.fx),

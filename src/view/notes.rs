@@ -1,10 +1,10 @@
-//! What a view says of itself beside its frames: the target, its place, and what it was like.
+//! Metadata of a view besides its frames: the target, its position, and the conditions.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{shortest, to_digits};
 
-/// Where the target is, when the recording says so; pixel coordinates.
+/// Region of the target in the image, if the recording gives it; pixel coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Region {
     /// Corners u0, v0, u1, v1; both edges belong to the region.
@@ -14,7 +14,7 @@ pub enum Region {
 }
 
 impl Region {
-    /// Does the centre of pixel (u, v) lie inside? Even-odd rule for polygons.
+    /// Whether the centre of pixel (u, v) lies inside; even-odd rule for polygons.
     pub fn contains(&self, u: f64, v: f64) -> bool {
         match self {
             Region::Rectangle([u0, v0, u1, v1]) => u >= *u0 && u <= *u1 && v >= *v0 && v <= *v1,
@@ -39,17 +39,17 @@ impl Region {
 pub struct TargetSize {
     pub width_m: f64,
     pub height_m: f64,
-    /// Distance of the two parallel planes that just hold its surface (ISO 1101), m.
+    /// Distance between the two parallel planes that just enclose its surface (ISO 1101), m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flatness_m: Option<f64>,
 }
 
-/// A board of which less than this share of the shorter side is flat is not used as a flat target; a
-/// flatness in millimetres lies beyond it.
+/// Largest flatness as a share of the shorter side: a worse board is not a flat target, and a flatness
+/// given in millimetres exceeds it.
 const MAX_FLATNESS: f64 = 0.1;
 
 impl TargetSize {
-    /// Of this width and height, m; nothing is stated of its flatness.
+    /// Size with this width and height, m, and no stated flatness.
     pub fn of(width_m: f64, height_m: f64) -> Self {
         TargetSize { width_m, height_m, flatness_m: None }
     }
@@ -71,7 +71,7 @@ impl TargetSize {
     }
 }
 
-/// What `view.json` may say.
+/// Contents of `view.json`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewNotes {
     pub target: Option<TargetSize>,
@@ -89,7 +89,7 @@ pub struct ViewNotes {
 }
 
 impl ViewNotes {
-    /// What is wrong with these numbers, if anything: the key is named.
+    /// What is wrong with these numbers, if anything; names the key.
     pub fn fault(&self) -> Option<String> {
         if self.reference_distance_m.is_some_and(|d| !(d.is_finite() && d > 0.0)) {
             return Some("reference_distance_m must be positive".into());

@@ -1,7 +1,7 @@
-//! The dump that fakenect plays, libfreenect's stand-in; each line is checked beforehand.
+//! The dump that fakenect, libfreenect's stand-in, plays. Every line is checked beforehand.
 //!
-//! fakenect ends the whole process when a file is missing, and reads beyond the end of one that is cut
-//! short. So it is only ever asked for lines that are good.
+//! fakenect ends the whole process if a file is missing, and reads past the end of a truncated one. So it is
+//! only ever asked for good lines.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::io::INDEX;
 use crate::read::read_text;
 
-/// Lines of a dump that may still be played, and what is to be said at their end.
+/// Number of lines of a dump left to play, and the message at their end.
 #[derive(Debug)]
 pub struct Dump {
     left: usize,
@@ -20,8 +20,8 @@ pub struct Dump {
 }
 
 impl Dump {
-    /// Check the dump at `root`.
-    /// An error when there is no index, or its first line is already bad.
+    /// Checks the dump at `root`.
+    /// Fails if there is no index, or its first line is bad.
     pub fn open(root: &Path) -> Result<Self> {
         let index = root.join(INDEX);
         let text = read_text(&index)?;
@@ -46,15 +46,15 @@ impl Dump {
         }
     }
 
-    /// Allow fakenect its next line.
-    /// An error says why the dump ends here.
+    /// Allows fakenect its next line.
+    /// The error is why the dump ends here.
     pub fn advance(&mut self) -> std::result::Result<(), String> {
         self.left = self.left.checked_sub(1).ok_or_else(|| self.ending.clone())?;
         Ok(())
     }
 }
 
-/// Is this a file that fakenect can read?
+/// Checks that fakenect can read this file.
 fn check(root: &Path, name: &str) -> std::result::Result<(), String> {
     let file = root.join(name);
     let length = std::fs::metadata(&file).map_err(|_| format!("{name} is missing"))?.len();
@@ -64,7 +64,7 @@ fn check(root: &Path, name: &str) -> std::result::Result<(), String> {
         return Err(format!("\"{name}\" is not a file of fakenect-record"));
     }
     if kind == "d" {
-        // Of many large files the first line and the length are enough.
+        // The files are many and large: the first line and the length must do.
         let mut header = Vec::new();
         File::open(&file)
             .and_then(|f| BufReader::new(f).read_until(b'\n', &mut header))

@@ -1,4 +1,4 @@
-//! What is known of a Kinect v1 before it is calibrated.
+//! What is known about a Kinect v1 before it is calibrated.
 
 use super::ffi::{HEIGHT, WIDTH, ZeroPlane};
 use crate::camera::Camera;
@@ -7,22 +7,22 @@ use crate::io::Assumed;
 use crate::sensors::{KINECT_BASELINE_M, OPENKINECT};
 use crate::view::Sensor;
 
-/// fx, fy, cx, cy of the depth camera, px, as libfreenect's own point-cloud viewer has them
-/// (examples/glpclview.c, after Nicolas Burrus's calibration of one unit).
+/// fx, fy, cx, cy of the depth camera, px, as in libfreenect's own point-cloud viewer (examples/glpclview.c,
+/// after Nicolas Burrus's calibration of one unit).
 const INTRINSICS: [f64; 4] = [594.21, 591.04, 339.5, 242.7];
 /// libfreenect places the optical axis in the middle of 640 x 480 px (freenect_camera_to_world).
 const FACTORY_CENTRE: [f64; 2] = [320.0, 240.0];
-/// The infrared camera has 1280 columns, the depth every second of them.
+/// Infrared columns per depth pixel: the infrared camera has 1280, and depth uses every second one.
 const COLUMNS_A_PIXEL: f64 = 2.0;
-/// Raw values a pixel, and the matcher's offset, px: libfreenect's registration.c.
+/// Raw values per pixel, and the matcher's offset, px: libfreenect's registration.c.
 const RAW_A_PIXEL: f64 = 4.0;
 const OFFSET_PX: f64 = 0.375;
 
-/// The numbers a unit's memory holds, as far as they make sense.
+/// Intrinsics, depth code and baseline, m, from a unit's memory; `None` if they are implausible.
 ///
-/// libfreenect converts a raw value with shift m = ((raw - 4 s)/4 - 0.375) p on the reference plane at
-/// distance R, p the size of a pixel there, E the distance of the projector and s the unit's
-/// shift: z = R E / (E - m), lengths in cm. So 1/z is affine in the raw value, and f = R / p.
+/// libfreenect converts a raw value to a shift m = ((raw - 4 s)/4 - 0.375) p on the reference plane at
+/// distance R, where p is the size of a pixel there and s the unit's shift. With the projector at distance E,
+/// z = R E / (E - m), lengths in cm. So 1/z is affine in the raw value, and f = R / p in infrared pixels.
 pub fn of_factory(plane: &ZeroPlane, const_shift: f64) -> Option<([f64; 4], DepthCode, f64)> {
     let [emitter, reference, pixel] =
         [plane.emitter_distance, plane.reference_distance, plane.reference_pixel_size]
@@ -43,8 +43,8 @@ pub fn of_factory(plane: &ZeroPlane, const_shift: f64) -> Option<([f64; 4], Dept
     Some(([focal, focal, cx, cy], code, emitter / 100.0))
 }
 
-/// The sensor as recording.json describes it: by what the user knows, else by what the factory
-/// wrote, else by what OpenKinect publishes.
+/// The sensor as recording.json describes it: from what the user gives, else from the factory's values, else
+/// from those that OpenKinect publishes.
 pub fn sensor(
     serial: Option<String>,
     factory: Option<(ZeroPlane, f64)>,

@@ -1,10 +1,10 @@
-//! libfreenect's C interface, loaded when it is needed. All that is unsafe in this program is in this
-//! file, and nothing that it makes public can be misused:
+//! libfreenect's C interface, loaded on demand. All unsafe code of this program is in this file, and its
+//! public interface cannot be misused:
 //!
-//! - Declarations follow libfreenect.h and libfreenect_registration.h of 0.5; that the file that is
-//!   loaded keeps to them is its user's promise.
-//! - The library is [`Loaded`], then started ([`Freenect`]), then has an open [`Device`]: each owns the
-//!   one before, so that no call meets a null handle, and all are closed in the opposite order.
+//! - Declarations follow libfreenect.h and libfreenect_registration.h of 0.5; the user must make sure that
+//!   the loaded file conforms to them.
+//! - The library is [`Loaded`], then started ([`Freenect`]), then has an open [`Device`]: each owns the one
+//!   before, so that no call meets a null handle, and all are closed in reverse order.
 //! - Handles are pointers, so these types stay on their thread. Callbacks run on the thread that
 //!   calls [`Device::process_events`], and cannot unwind into C: `extern "C"` aborts.
 
@@ -20,14 +20,14 @@ use libloading::Library;
 pub const WIDTH: usize = 640;
 pub const HEIGHT: usize = 480;
 pub const DEPTH_BYTES: usize = 2 * WIDTH * HEIGHT;
-/// An infrared picture has eight rows more than the depth.
+/// Infrared images have eight more rows than depth images.
 pub const INFRARED_HEIGHT: usize = 488;
 pub const INFRARED_BYTES: usize = 2 * WIDTH * INFRARED_HEIGHT;
 
 const RESOLUTION_MEDIUM: c_int = 1;
 const DEPTH_11BIT: c_int = 0;
 const VIDEO_IR_10BIT: c_int = 3;
-/// Cameras only: a motor that is missing or claimed by others must not stop us.
+/// Cameras only: a motor that is missing or in use must not stop us.
 const SUBDEVICE_CAMERA: c_int = 2;
 const LOG_ERROR: c_int = 1;
 
@@ -52,8 +52,8 @@ impl FrameMode {
     }
 }
 
-/// A unit's reference plane: lengths in cm (the header's comments say otherwise; its own
-/// conversion to mm says so).
+/// Reference plane of a unit; lengths in cm (against the header's comments, but
+/// according to its own conversion to mm).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroPlane {
@@ -160,18 +160,18 @@ thread_local! {
     static MAILBOX: RefCell<Mailbox> = RefCell::default();
 }
 
-/// What the callbacks have brought to the thread that called the library.
+/// What the callbacks have delivered to the thread that called the library.
 #[derive(Default)]
 pub struct Mailbox {
-    /// Depth frames with the time they came, the oldest first.
+    /// Depth frames with their arrival times, oldest first.
     pub depth: VecDeque<(SystemTime, Vec<u8>)>,
-    /// The newest infrared picture.
+    /// The latest infrared image.
     pub infrared: Option<Vec<u8>>,
-    /// The library's last complaint.
+    /// The library's last error message.
     pub log: String,
 }
 
-/// Look into this thread's mailbox, or put something in.
+/// Accesses this thread's mailbox.
 pub fn mailbox<T>(with: impl FnOnce(&mut Mailbox) -> T) -> T {
     MAILBOX.with_borrow_mut(with)
 }
@@ -185,7 +185,7 @@ unsafe fn copied(pixels: *const c_void, bytes: usize) -> Option<Vec<u8>> {
 }
 
 extern "C" fn on_depth(_: Handle, pixels: *mut c_void, _ticks: u32) {
-    // SAFETY: the mode that was set has this many bytes a frame.
+    // SAFETY: the mode that was set has this many bytes per frame.
     let bytes = unsafe { copied(pixels, DEPTH_BYTES) };
     mailbox(|mail| mail.depth.extend(bytes.map(|bytes| (SystemTime::now(), bytes))));
 }
@@ -204,14 +204,14 @@ extern "C" fn on_log(_: Handle, level: c_int, message: *const c_char) {
     }
 }
 
-/// The library with its functions, none of which has been called.
+/// The loaded library, not yet started.
 pub struct Loaded {
     functions: Functions,
-    /// Last: the functions point into it.
+    /// Dropped last: the functions point into it.
     _library: Library,
 }
 
-/// The library at work.
+/// The started library.
 pub struct Freenect {
     /// Never null.
     context: Handle,
@@ -226,7 +226,7 @@ pub struct Device {
 }
 
 impl Loaded {
-    /// Find the functions.
+    /// Loads the library and looks up its functions.
     pub fn load(path: &Path) -> Result<Self, String> {
         // SAFETY: loading runs the library's initialisers; libfreenect and libusb have harmless ones.
         let library = unsafe { Library::new(path) }.map_err(|e| e.to_string())?;
@@ -234,13 +234,13 @@ impl Loaded {
         Ok(Loaded { functions, _library: library })
     }
 
-    /// Is it fakenect, which plays a dump and cannot list devices?
+    /// Whether it is fakenect, which plays a dump and cannot list devices.
     pub fn is_stand_in(&self) -> bool {
         self.functions.list_device_attributes.is_none()
     }
 
     pub fn start(self) -> Result<Freenect, String> {
-        // Nothing that an earlier library brought.
+        // Discards what an earlier library left.
         MAILBOX.take();
         let f = &self.functions;
         let mut context = ptr::null_mut();
@@ -260,13 +260,13 @@ impl Loaded {
 }
 
 impl Freenect {
-    /// Number of sensors; negative when USB cannot be asked.
+    /// Number of sensors; negative if USB is not accessible.
     pub fn devices(&self) -> i32 {
         // SAFETY: the library is started.
         unsafe { (self.loaded.functions.num_devices)(self.context) }
     }
 
-    /// The sensors' serials; `None` when the library cannot tell.
+    /// The sensors' serial numbers; `None` if the library cannot list them.
     pub fn serials(&self) -> Option<Vec<String>> {
         let f = &self.loaded.functions;
         let (list, free) = (f.list_device_attributes?, f.free_device_attributes?);
@@ -288,7 +288,7 @@ impl Freenect {
         Some(serials)
     }
 
-    /// Open a sensor, by its serial or the first.
+    /// Opens a sensor by its serial number, or the first one.
     pub fn open(self, serial: Option<&CStr>) -> Result<Device, i32> {
         let f = &self.loaded.functions;
         let mut device = ptr::null_mut();
@@ -306,7 +306,7 @@ impl Freenect {
 }
 
 impl Device {
-    /// Start depth in 11-bit words, unpacked to 16.
+    /// Starts depth in 11-bit words, unpacked to 16.
     pub fn start_depth(&self) -> Result<(), &'static str> {
         let f = self.functions();
         // SAFETY: the device is open.
@@ -322,7 +322,7 @@ impl Device {
         }
     }
 
-    /// Start 10-bit infrared; false when the sensor will not.
+    /// Starts 10-bit infrared; false if that fails.
     pub fn start_infrared(&self) -> bool {
         let f = self.functions();
         // SAFETY: the device is open.
@@ -335,7 +335,7 @@ impl Device {
         }
     }
 
-    /// What the factory measured on this unit: its reference plane and shift.
+    /// Factory calibration of this unit: its reference plane and shift.
     pub fn zero_plane(&self) -> Option<(ZeroPlane, f64)> {
         let f = self.functions();
         let (copy, destroy) = (f.copy_registration?, f.destroy_registration?);
@@ -348,7 +348,7 @@ impl Device {
         }
     }
 
-    /// Let the library work for at most 0.1 s; negative when the sensor is gone.
+    /// Lets the library work for at most 0.1 s; negative if the sensor is gone.
     pub fn process_events(&self) -> i32 {
         let mut wait = TimeValue { seconds: 0, microseconds: 100_000 };
         // SAFETY: the library is started.

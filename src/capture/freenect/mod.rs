@@ -1,9 +1,9 @@
-//! A Kinect v1 through libfreenect, which is loaded at run time: nothing is needed to build. A
-//! thread of its own serves it while a frame is looked at.
+//! A Kinect v1 through libfreenect, which is loaded at run time and not needed to build. A thread of its own
+//! serves the sensor while frames are processed.
 
 mod dump;
 mod factory;
-#[allow(unsafe_code)] // a C library: the one place of it
+#[allow(unsafe_code)] // the only C library
 mod ffi;
 mod unit;
 
@@ -19,25 +19,25 @@ use crate::io::Assumed;
 use crate::view::Sensor;
 use unit::Unit;
 
-/// Frames that may wait: two seconds of a Kinect, 37 MB.
+/// Queue capacity in frames: two seconds of a Kinect, 37 MB.
 const CAPACITY: usize = 60;
-/// How long the thread waits for a frame before it looks whether anyone still listens.
+/// How long the thread waits for a frame before it checks that the receiver still exists.
 const POLL: Duration = Duration::from_millis(100);
-/// A device that takes longer to close is left to the end of the process.
+/// A device that takes longer to close is left open until the process ends.
 const MAX_CLOSING: Duration = Duration::from_secs(2);
 
-/// What the user asks of the sensor.
+/// User options for the sensor.
 #[derive(Debug, Clone, Default)]
 pub struct FreenectOptions {
-    /// The library's file; by default looked for where the system keeps libraries.
+    /// The library's file; by default searched where the system keeps libraries.
     pub library: Option<PathBuf>,
-    /// Which unit, when several are plugged in.
+    /// Serial number of the unit, if several are connected.
     pub serial: Option<String>,
-    /// Record infrared too, where the sensor gives it beside the depth.
+    /// Whether to record infrared too, if the sensor delivers it beside the depth.
     pub infrared: bool,
-    /// In place of what the unit's memory says.
+    /// Overrides of the values in the unit's memory.
     pub assumed: Assumed,
-    /// What the library plays if it is fakenect, which reads the path from FAKENECT_PATH itself.
+    /// Dump to play if the library is fakenect, which reads the path from FAKENECT_PATH itself.
     pub dump: Option<PathBuf>,
 }
 
@@ -47,7 +47,7 @@ pub struct FreenectSource {
     sensor: Sensor,
     remarks: Vec<String>,
     live: bool,
-    /// `None` once nobody listens any more, which ends the thread.
+    /// Set to `None` to end the thread.
     arrivals: Option<Receiver<Arrival>>,
     dropped: Arc<AtomicUsize>,
     /// Disconnected when the thread has closed the sensor.
@@ -55,8 +55,8 @@ pub struct FreenectSource {
 }
 
 impl FreenectSource {
-    /// Load the library, find the unit, start its depth.
-    /// An error when the library is missing or something else, no unit is there, or it cannot be started.
+    /// Loads the library, finds the unit and starts its depth stream.
+    /// Fails if the library is missing or is not libfreenect, no unit is connected, or it cannot be started.
     pub fn open(options: FreenectOptions) -> Result<Self> {
         let (to_queue, arrivals) = sync_channel(CAPACITY);
         let (to_opened, opened) = sync_channel(1);
@@ -82,7 +82,7 @@ impl FreenectSource {
     }
 }
 
-/// Pass arrivals on until the last, or until nobody listens.
+/// Forwards arrivals until the last one, or until the receiver is gone.
 fn serve(mut unit: Unit, to: &SyncSender<Arrival>, dropped: &AtomicUsize) {
     loop {
         let arrival = unit.next(POLL);

@@ -1,4 +1,4 @@
-//! One Kinect, on the thread that opened it: the library's handles need not be moved.
+//! One Kinect, used only on the thread that opened it, so that the library's handles need not move.
 
 use std::ffi::CString;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::view::Sensor;
 
-/// Names under which systems keep the library, most exact first.
+/// File names of the library on various systems, most specific first.
 const NAMES: [&str; 6] = [
     "libfreenect.so.0.5",
     "libfreenect.so.0",
@@ -31,14 +31,14 @@ pub struct Unit {
     device: Device,
     pub sensor: Sensor,
     infrared: bool,
-    /// What fakenect plays, the stand-in for libfreenect.
+    /// Dump played by fakenect, the stand-in for libfreenect.
     dump: Option<Dump>,
     pub remarks: Vec<String>,
 }
 
 impl Unit {
-    /// Load the library, find the unit, start its depth.
-    /// An error when the library is missing or something else, no unit is there, or it cannot be started.
+    /// Loads the library, finds the unit and starts its depth stream.
+    /// Fails if the library is missing or is not libfreenect, no unit is connected, or it cannot be started.
     pub fn open(options: &FreenectOptions) -> Result<Self> {
         let (library, dump) = load(options)?;
         let serial = serial(&library, options.serial.as_deref())?;
@@ -59,7 +59,7 @@ impl Unit {
         }
         let refused = |what| Error::sensor(format!("{what}{}", complaint()), PLUG_IN);
         device.start_depth().map_err(refused)?;
-        // The stand-in aborts when it is asked for a mode it has not.
+        // The stand-in aborts if it is asked for a mode that it lacks.
         let infrared = options.infrared && dump.is_none() && device.start_infrared();
         if options.infrared && !infrared {
             remarks.push("no infrared beside the depth; depth alone is recorded".into());
@@ -67,7 +67,7 @@ impl Unit {
         Ok(Unit { device, sensor, infrared, dump, remarks })
     }
 
-    /// A dump waits; a sensor does not.
+    /// Whether frames arrive in real time; a dump waits.
     pub fn live(&self) -> bool {
         self.dump.is_none()
     }
@@ -95,7 +95,7 @@ impl Unit {
     fn frame(&self, mail: &mut Mailbox) -> Option<LiveFrame> {
         let (arrived, bytes) = mail.depth.pop_front()?;
         let infrared = mail.infrared.take().filter(|_| self.infrared);
-        // The 480 rows in the middle of 488.
+        // The middle 480 of 488 rows.
         let above = 2 * WIDTH * (INFRARED_HEIGHT - HEIGHT) / 2;
         Some(LiveFrame {
             stamp: arrived.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
@@ -105,7 +105,7 @@ impl Unit {
     }
 }
 
-/// The library, and the dump that it plays if it is the stand-in.
+/// Loads the library, and checks the dump that it plays if it is the stand-in.
 fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
     let candidates = match &options.library {
         Some(path) => vec![path.clone()],
@@ -132,7 +132,7 @@ fn load(options: &FreenectOptions) -> Result<(Freenect, Option<Dump>)> {
     Err(Error::sensor(format!("libfreenect cannot be loaded ({why})"), INSTALL))
 }
 
-/// Of the unit to open, where the library knows it.
+/// Serial number of the unit to open, if the library knows it.
 fn serial(library: &Freenect, wanted: Option<&str>) -> Result<Option<String>> {
     if library.devices() < 1 {
         return Err(Error::sensor("no Kinect is connected (0 devices)", PLUG_IN));
@@ -144,7 +144,7 @@ fn serial(library: &Freenect, wanted: Option<&str>) -> Result<Option<String>> {
             "correct --serial",
         )),
         (Some(wanted), _) => Ok(Some(wanted.into())),
-        // Later models have zeros for a serial.
+        // Later models have zeros as a serial number.
         (None, _) => Ok(known.into_iter().flatten().next().filter(|s| s.contains(|c| c != '0'))),
     }
 }

@@ -21,7 +21,7 @@ fn guide(distances_m: &[f64], tilts_deg: &[f64]) -> Guide {
     Guide::new(Wanted::grid(distances_m, &tilts), SHUTTER)
 }
 
-/// A letter an event: b(egun) k(eep) f(inished) a(bandoned) d(rift) . (done), - for none.
+/// One letter per event: b(egun) k(eep) f(inished) a(bandoned) r(ejected) d(rift) . (done), - for none.
 fn story(guide: &mut Guide, sights: impl IntoIterator<Item = Result<Sighting, String>>) -> String {
     let mut story = String::new();
     for (k, sight) in sights.into_iter().enumerate() {
@@ -101,8 +101,7 @@ fn a_bad_view_is_taken_again_and_one_that_cannot_be_had_is_skipped() {
     assert!(g.wanted().is_done());
 }
 
-/// The suggestion stays with a view until another is much nearer; what is being taken may be
-/// another one.
+/// The suggestion stays with a view until another is much nearer; the view being taken may be another.
 #[test]
 fn keys_are_about_what_is_being_taken() {
     let mut g = Guide::new(Wanted::any(), SHUTTER);
@@ -140,8 +139,8 @@ fn with_any_pose_wanted_each_new_one_is_a_view_and_an_abandoned_one_is_none() {
     assert_eq!(story(&mut g, at(1.31, 4)), "- - - -", "known from the folder's name");
 }
 
-/// The watcher on pictures by formula: the pose within a part of sigma's own standard error over
-/// the board (it has tens of thousands of pixels), and stillness through noise.
+/// The watcher on simulated frames: the pose to 3 mm and 0.5 degrees (the board has tens of thousands of
+/// pixels), and stillness despite noise.
 #[test]
 fn from_frames_to_events() {
     let sensor = kinect_v1(2);

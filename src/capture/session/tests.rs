@@ -41,7 +41,7 @@ fn views_are_whole_or_not_there_and_are_replaced_whole() {
     assert!(!root.join(PARTIAL).exists());
 }
 
-/// As kills between two renames leave them.
+/// The state that a kill between two renames leaves.
 #[test]
 fn an_interrupted_run_is_tidied_up() {
     let folder = tempfile::tempdir().unwrap();

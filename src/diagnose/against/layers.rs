@@ -1,4 +1,4 @@
-//! Against a simulated recording: the mean and the size of the noise, patch by patch.
+//! Comparison with a simulated recording: the mean and the size of the noise, patch by patch.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -10,11 +10,11 @@ use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::tiles::SIDE;
 use crate::solve::{Left, left_by_fit};
 
-/// Gross errors make the noise of one view in two runs differ, in log variance.
+/// Difference in log variance of one view between two runs, due to gross errors.
 const ANOTHER_RUN: f64 = 0.12;
 
 impl Baseline {
-    /// Take the simulated mean out of the real one, tile by tile.
+    /// Subtracts the simulated mean from the real one, tile by tile.
     pub fn means(&self, survey: &mut Survey) {
         survey.fixed_px2 += fixed_px2(&self.structure);
         for (real, twin) in survey.views.iter_mut().zip(&self.survey.views) {
@@ -27,7 +27,7 @@ impl Baseline {
                         t.square += m * m - 2.0 * m * t.mean;
                         t.mean -= m;
                     }
-                    // Seen by one of them alone: nothing to compare.
+                    // Seen in only one of them: nothing to compare.
                     None => (t.mean, t.pixels) = (f64::NAN, 0.0),
                 }
             }
@@ -35,10 +35,10 @@ impl Baseline {
         }
     }
 
-    /// The simulated variance in the place of the model's, block by block; `false` where the
-    /// simulated views hardly have any.
+    /// Replaces the model's variance by the simulated one, block by block. Returns `false` where the
+    /// simulated views have hardly any.
     pub fn variances(&mut self, survey: &mut Survey) -> bool {
-        // Of noise that hardly changes from frame to frame all is measured, in both or in neither.
+        // Noise that hardly changes between frames is measured in total, in both recordings or in neither.
         for (real, twin) in survey.views.iter_mut().zip(&mut self.survey.views) {
             if real.between_frame_factor.is_none() || twin.between_frame_factor.is_none() {
                 (real.between_frame_factor, twin.between_frame_factor) = (None, None);
@@ -58,8 +58,8 @@ impl Baseline {
                 .zip(&twin.response)
                 .map(|(p, y)| (patch(p.u, p.v, side), *y))
                 .collect();
-            // Terms that depend on the variance itself must not have the blocks' errors in them: these
-            // are in what they are fitted to.
+            // Terms that depend on the variance itself must not contain the errors of the blocks, which the
+            // response that they are fitted to contains.
             let smooth = logs.values().sum::<f64>() / logs.len().max(1) as f64;
             for (place, t) in real.patches_mut() {
                 place.variance = t.noise_variance * smooth.exp();
@@ -72,8 +72,8 @@ impl Baseline {
         true
     }
 
-    /// The simulated variances are as uncertain as the real ones, and both more so than a
-    /// Gaussian's where gross errors come in clumps.
+    /// The simulated variances are as uncertain as the real ones, and both more than a Gaussian's
+    /// where gross errors clump.
     pub fn inflate_log_variances(&self, survey: &mut Survey) {
         survey.tolerance = ANOTHER_RUN;
         let (ours, theirs) = (survey.variance_data(), self.survey.variance_data());
@@ -88,8 +88,8 @@ impl Baseline {
     }
 }
 
-/// How much more the blocks of a view scatter about a plane in the picture than Gaussian noise
-/// would make them: the square of a ratio, at least 1.
+/// Scatter of a view's blocks about a plane in the picture relative to Gaussian noise, as a ratio of
+/// variances of at least 1.
 fn scatter(view: &ViewData) -> f64 {
     let n = view.places.len();
     if n < 6 {
@@ -101,7 +101,7 @@ fn scatter(view: &ViewData) -> f64 {
     });
     let y = nalgebra::DVector::from_fn(n, |i, _| root[i] * view.response[i]);
     let Some(Left { squares: chi2, free }) = left_by_fit(&x, &y) else { return 1.0 };
-    // Four standard deviations beyond what chance makes.
+    // Four standard deviations beyond chance.
     if chi2 > free + 4.0 * (2.0 * free).sqrt() { chi2 / free } else { 1.0 }
 }
 

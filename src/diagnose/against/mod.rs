@@ -1,8 +1,7 @@
-//! A simulated recording in the model's place: view by view, what the real one shows beyond it.
+//! A simulated recording in place of the model: what the real one shows beyond it, view by view.
 //!
-//! Means are compared tile by tile, each about its own plane, and variances block by block
-//! (`layers`); the structure of the noise view by view (`textures`). Both sides'
-//! errors count.
+//! Means are compared tile by tile, each about its own plane, and variances block by block (`layers`); the
+//! structure of the noise view by view (`textures`). The errors of both sides count.
 
 pub mod layers;
 pub mod noise;
@@ -37,18 +36,18 @@ pub struct Baseline {
     pub(in crate::diagnose) structure: Vec<Structure>,
     pub(in crate::diagnose) textures: Vec<TextureFinding>,
     pub(in crate::diagnose) lattice: Quantisation,
-    /// Variance with another name.
+    /// Variance with a cause of its own: quantisation steps and row noise.
     pub steps: Steps,
     pub(in crate::diagnose) heavy: bool,
-    /// What was odd, in words.
+    /// Oddities, in words.
     pub remarks: Vec<String>,
 }
 
-/// Numbers of two cameras that differ by less are the same, as a share.
+/// Relative difference up to which numbers of two cameras are the same.
 const SAME: f64 = 0.01;
 
 impl Baseline {
-    /// Read `simulated` and keep of `fields` those views that have a partner there; the others are told.
+    /// Reads `simulated` and keeps those `fields` that have a partner there; returns the others as excluded.
     pub fn of(
         simulated: &Recording,
         real: &Sensor,
@@ -128,7 +127,7 @@ impl Baseline {
         }
     }
 
-    /// Distances by other means, off by what the simulated view's own are off.
+    /// Shifts the reference distances by the error of the simulated view's own.
     pub fn references(&self, fields: &mut [Field]) {
         for (real, twin) in fields.iter_mut().zip(&self.fields) {
             if let (Some(reference), Some(own)) =
@@ -140,7 +139,7 @@ impl Baseline {
     }
 }
 
-/// Pictures can be laid over one another only when one camera took both.
+/// Checks that one camera took both: only then can their pictures be compared pixel by pixel.
 fn same_sensor(real: &Sensor, simulated: &Sensor) -> Result<()> {
     let (a, b) = (&real.camera, &simulated.camera);
     let remedy = "simulate the sensor of the recording: the same recording.json";
@@ -167,14 +166,14 @@ fn same_sensor(real: &Sensor, simulated: &Sensor) -> Result<()> {
     }
 }
 
-/// Poses farther apart are different ones: a share of the distance, tilt, direction of the tilt.
+/// Largest differences of the same pose: share of the distance, tilt, direction of the tilt.
 const Z_SHARE: f64 = 0.1;
 const THETA_RAD: f64 = 8.0 * TAU / 360.0;
 const AZIMUTH_RAD: f64 = 30.0 * TAU / 360.0;
 /// Below this tilt a plane has no direction.
 const TILTED_RAD: f64 = 10.0 * TAU / 360.0;
 
-/// How far two planes are from one another, in tolerances; `None` where one is exceeded.
+/// Distance between two planes, in tolerances; `None` where one is exceeded.
 fn off(real: &Plane, simulated: &Plane) -> Option<f64> {
     let [z, z_simulated] = [real, simulated].map(|p| p.depth(0.0, 0.0));
     let [theta, theta_simulated] = [real, simulated].map(Plane::theta);
@@ -186,8 +185,8 @@ fn off(real: &Plane, simulated: &Plane) -> Option<f64> {
     (z.max(theta).max(azimuth) <= 1.0).then_some(z + theta + azimuth)
 }
 
-/// For each real view the number of its simulated one; none serves twice. A name alone is not
-/// enough: numbered views of two recordings have the same names.
+/// Index of the simulated view for each real one, none used twice. A name alone is not enough: numbered views
+/// of two recordings have the same names.
 fn partners(real: &[Field], simulated: &[Field]) -> Vec<Option<usize>> {
     let mut pairs: Vec<(bool, f64, usize, usize)> = Vec::new();
     for (i, r) in real.iter().enumerate() {
@@ -227,7 +226,7 @@ mod tests {
         ];
         let simulated = [
             pose("c", 2.1, 0.0, 0.0),
-            // The name of a, the pose of another.
+            // Named like a, with another pose.
             pose("a", 3.0, 30.0, 179.0),
             pose("x", 1.02, 33.0, -175.0),
             pose("y", 0.97, 1.0, 0.0),

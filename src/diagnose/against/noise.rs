@@ -1,9 +1,9 @@
-//! Against a simulated recording: the size of the noise that stands still within a view, of the noise that
-//! changes from frame to frame, and of the light that both come with.
+//! Comparison with a simulated recording: the noise that is constant within a view, the noise that changes
+//! from frame to frame, and the light that comes with both.
 //!
-//! The total hides causes from one another. Laser speckle stands still as long as the scene does, read and
-//! shot noise change, a larger window averages both alike, and a target that moves turns what stood
-//! still into what changes. The views are the sample of each.
+//! The total hides causes from one another. Laser speckle is constant as long as the scene is, read and shot
+//! noise change, a larger window averages both alike, and a moving target turns constant noise into changing
+//! noise. The views are the sample of each.
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::Map;
@@ -20,21 +20,21 @@ use crate::solve::fit_by_svd;
 use crate::stats::{mean as mean_of_all, range};
 use crate::terms::{Axis, ROOM_LUX, Statistic};
 
-/// That the noise differs is known by then: a sign of why need be no surer than this.
+/// Level for naming a cause: that the noise differs is known by then.
 pub const NAMED_LEVEL: f64 = 0.05;
-/// A part of the noise below this share is lost in the other.
+/// A part of the noise below this share cannot be told from the other.
 const MIN_PART: f64 = 0.005;
 
-/// What a view's noise is beside the simulated one's.
+/// Noise of a view relative to the simulated one's.
 struct View {
-    /// Variance over the simulated one's, natural logarithms.
+    /// Log ratios of the variance to the simulated one.
     still: f64,
     changing: f64,
-    /// Variance over the simulated one's, less one.
+    /// Relative difference from the simulated variance.
     total: f64,
-    /// How much more the correlation of two frames falls with the time between them.
+    /// Additional fall of the correlation of two frames with the time between them.
     falls: f64,
-    /// Of this view's variance, what stands still.
+    /// Constant share of this view's variance.
     share: f64,
     pixels: f64,
 }
@@ -42,7 +42,7 @@ struct View {
 impl View {
     fn of(real: &Structure, twin: &Structure) -> Option<Self> {
         let parts = |s: &Structure| {
-            // What stands still in every view is a pattern of the sensor's.
+            // What is constant in every view is a pattern of the sensor.
             let fixed = s.still.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
             let all = of_any_two(s).filter(|c| (MIN_PART..1.0 - MIN_PART).contains(c))?;
             let still = Some(all - fixed).filter(|still| *still > MIN_PART)?;
@@ -61,12 +61,12 @@ impl View {
     }
 }
 
-/// Which way each part of the noise differs from the simulated one's, if it does.
+/// Direction in which each part of the noise differs from the simulated one, if it does.
 pub struct NoiseParts {
     views: Vec<View>,
     still: ViewMean,
     changing: ViewMean,
-    /// What stands still less what changes.
+    /// Constant part less changing part.
     apart: ViewMean,
     level: f64,
 }
@@ -88,18 +88,18 @@ impl NoiseParts {
         m.p_below(0.0) < self.level
     }
 
-    /// Less of both by about the same factor: averaged over more pixels.
+    /// Whether both parts are smaller by about the same factor: averaged over more pixels.
     pub fn shrink_alike(&self) -> bool {
         let alike = !self.up(&self.apart) && !self.down(&self.apart);
         self.down(&self.still) && self.down(&self.changing) && alike
     }
 
-    /// Root of the share by which the variance differs.
+    /// Root of the relative difference of the variances.
     fn size_sigma(&self) -> f64 {
         mean(&self.views, |v| v.total).map_or(0.0, |m| m.value.abs().sqrt())
     }
 
-    /// Does the still part become the changing one, as where the target moves under the pattern?
+    /// Whether constant noise becomes changing noise, as where the target moves under the pattern.
     fn renews(&self, velocity_p: f64) -> bool {
         let falls = mean(&self.views, |v| v.falls).map_or(1.0, |m| m.p_above(0.0));
         self.down(&self.still) && self.up(&self.changing) && falls.min(velocity_p) < NAMED_LEVEL
@@ -116,7 +116,7 @@ impl NoiseParts {
                 ..self.texture()
             });
         }
-        // Blur and steps make more of both, and more so of what changes.
+        // Blur and steps increase both parts, the changing one more.
         if self.up(&self.still) && self.apart.p_above(0.0) < NAMED_LEVEL {
             return Some(TextureFinding {
                 families: vec!["frozen-noise"],
@@ -161,12 +161,12 @@ fn mean(views: &[View], of: impl Fn(&View) -> f64) -> Option<ViewMean> {
 }
 
 impl Baseline {
-    /// How the parts of the noise compare; `None` where one of them can hardly be seen.
+    /// Compares the parts of the noise; `None` where one of them can hardly be seen.
     pub fn noise_parts(&self, real: &[Structure], level: f64) -> Option<NoiseParts> {
         NoiseParts::of(real, &self.structure, level)
     }
 
-    /// What the parts of the noise, and the infrared images, say.
+    /// Findings from the parts of the noise and from the infrared images.
     pub fn noise_findings(
         &self,
         parts: Option<&NoiseParts>,
@@ -175,33 +175,33 @@ impl Baseline {
         level: f64,
     ) -> Vec<TextureFinding> {
         let light = ambient_light(fields, &self.fields, level);
-        // Light of the room is more noise of the image itself.
+        // Ambient light is additional noise of the image itself.
         let of_light = |f: &TextureFinding| light.is_some() && f.families.is_empty();
         let noise = parts.and_then(|p| p.finding(velocity(real))).filter(|f| !of_light(f));
         noise.into_iter().chain(light).collect()
     }
 }
 
-/// A line through fewer has next to no error to be judged by.
+/// Fewest views for a line: with fewer, hardly any residual is left to judge it by.
 const MIN_LIT_VIEWS: usize = 4;
 
-/// One recording's light over the other's, view by view: a line.
+/// Line through one recording's light over the other's, one point per view.
 struct LightLine {
-    /// Its height less the other's at the darkest view, and where the other has no light.
+    /// Its excess over the other's light at the darkest view, and its height where the other has no light.
     lift: ViewMean,
     at_no_light: ViewMean,
     slope: f64,
 }
 
 impl LightLine {
-    /// Of pairs [other, one].
+    /// Fits pairs [other, one].
     fn of(pairs: &[[f64; 2]]) -> Option<Self> {
         let n = pairs.len();
         if n < MIN_LIT_VIEWS {
             return None;
         }
         let [darkest, _] = range(pairs.iter().map(|p| p[0]));
-        // Errors are shares of the light.
+        // Errors are proportional to the light.
         let x = DMatrix::from_fn(n, 2, |i, k| [1.0, pairs[i][0] - darkest][k] / pairs[i][0]);
         let y = DVector::from_fn(n, |i, _| pairs[i][1] / pairs[i][0]);
         let (line, rank) = fit_by_svd(&x, &y)?;
@@ -223,9 +223,9 @@ impl LightLine {
     }
 }
 
-/// Light of the room: the infrared images are lighter than the simulated ones by a constant, in the darkest
-/// view as in the lightest. More or less light of the pattern would be a factor. Poses that differ a little
-/// make either line flatter than it is, so that both must say so.
+/// Tests for ambient light: the infrared images are lighter than the simulated ones by a constant, in the
+/// darkest view as in the lightest. A change of the pattern's light would be a factor. Small differences of
+/// the poses flatten either recording's line over the other, so both lines must show it.
 fn ambient_light(real: &[Field], twins: &[Field], level: f64) -> Option<TextureFinding> {
     let lit = real.iter().zip(twins).filter_map(|(r, t)| Some([t.infrared?, r.infrared?]));
     let pairs: Vec<[f64; 2]> = lit.filter(|p| p[0] > 0.0 && p[1] > 0.0).collect();
@@ -236,7 +236,7 @@ fn ambient_light(real: &[Field], twins: &[Field], level: f64) -> Option<TextureF
     if p >= level || slope <= 0.0 {
         return None;
     }
-    // Over the pattern's on a surface that faces the sensor at 1 m, by the lux of the real room.
+    // Relative to the pattern on a surface facing the sensor at 1 m, scaled by the lux of the real room.
     let ratios = real.iter().zip(twins).filter_map(|(r, t)| {
         let lux = r.ambient_lux.unwrap_or(ROOM_LUX).max(1.0);
         Some(at_no_light.value / (slope * t.pattern_at_1m()?) * ROOM_LUX / lux)

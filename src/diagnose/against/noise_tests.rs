@@ -5,12 +5,12 @@ use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
 
 const VIEWS: usize = 12;
-/// Of a frame's variance, what stands still in a speckle simulator's recordings.
+/// Constant share of a frame's variance in a speckle simulator's recordings.
 const STILL: f64 = 0.9;
 const LEVEL: f64 = 1e-3;
 
-/// A view's noise with so much of either part, each measured to a few per cent; with the time between two
-/// frames their likeness falls.
+/// Noise of a view with these multiples of either part, measured to 15 % and 5 %; the correlation of its
+/// frames falls with the time between them.
 fn view([still, changing]: [f64; 2], falls: f64, rng: &mut Stream) -> Structure {
     let mut about = |x: f64, error: f64| -> f64 {
         let normal: f64 = StandardNormal.sample(rng);
@@ -32,7 +32,7 @@ fn parts(of: [f64; 2], falls: f64, rng: &mut Stream) -> Option<NoiseParts> {
     NoiseParts::of(&real, &twins, LEVEL)
 }
 
-/// What the speckle simulator does to either part, read off its recordings: 36 of each cause.
+/// Effect of each cause on the parts, read off 36 recordings each of the speckle simulator.
 #[test]
 fn each_cause_changes_the_parts_in_its_own_way() {
     let frozen = Some(vec!["frozen-noise"]);
@@ -71,8 +71,8 @@ fn a_larger_window_shrinks_both_parts_alike_and_the_same_sensor_neither() {
     assert!(said <= 4, "{said} of 200 clean ones");
 }
 
-/// Views of one pixel from 0.9 m on, in steps of `apart`; the real ones' infrared images are lighter by `more`,
-/// and each is off by the share `error`.
+/// Views of one pixel from 0.9 m on, in steps of `apart`. The real infrared images are lighter by `more`;
+/// each image has a relative error of `error`.
 fn lit(more: f64, apart: f64, error: f64, rng: &mut Stream) -> [Vec<Field>; 2] {
     let field = |z: f64, infrared: f64| Field {
         infrared: Some(infrared),
@@ -102,7 +102,7 @@ fn light_of_the_room_is_a_constant_and_a_brighter_pattern_is_a_factor() {
         let found = ambient_light(&real, &twins, LEVEL).expect("60 more everywhere");
         assert_eq!(found.families, ["ambient-light"]);
         let ratio = found.parameters["ratio"]["value"].as_f64().unwrap();
-        // 200 at 1 m, the offset among them.
+        // 200 at 1 m, including the offset.
         assert!((ratio - 0.25).abs() < 0.1, "{ratio}");
         let [real, twins] = lit(0.0, 0.15, 0.01, &mut rng);
         assert!(ambient_light(&real, &twins, LEVEL).is_none());
@@ -116,7 +116,7 @@ fn light_of_the_room_is_a_constant_and_a_brighter_pattern_is_a_factor() {
     }
 }
 
-/// Views about equally light whose poses differ by a tenth: the line is flat, and no light of the room.
+/// Views of about equal light whose poses differ by a tenth: the line is flat, without ambient light.
 #[test]
 fn views_that_are_alike_show_no_light_of_the_room() {
     let said = (0..200).filter(|seed| {

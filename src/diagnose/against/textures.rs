@@ -1,4 +1,4 @@
-//! Against a simulated recording: the structure of the noise and steps, view by view.
+//! Comparison with a simulated recording: the structure of the noise and steps, view by view.
 
 use super::Baseline;
 use crate::diagnose::noise::in_time::still_level;
@@ -11,12 +11,12 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
 use crate::stats::{mean, range};
 
-/// Tails of two recordings are no news within this factor: gross errors come in clumps.
+/// Factor within which the tails of two recordings are alike: gross errors clump.
 const TAILS_ALIKE: f64 = 3.0;
 
 impl Baseline {
-    /// Replace each statistic of the real views by its difference to the twin's, on the level of
-    /// the simulated recording; what that level is goes to `known`.
+    /// Replaces each statistic of the real views by its difference from the twin's plus the mean over the
+    /// simulated recording, which goes to `known`.
     pub fn compare(
         &self,
         structure: &mut [Structure],
@@ -38,7 +38,7 @@ impl Baseline {
             s.window_px = s.window_px.zip(twin.window_px).map(|(r, t)| r / t * windows.exp());
             differ(&mut s.still.fixed_px2, twin.still.fixed_px2, fixed.max(0.0));
             differ(&mut s.row_px2, twin.row_px2, rows.max(0.0));
-            // Nothing is known of columns: what both have must vanish.
+            // Nothing is known of columns: what both have must cancel.
             differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
             differ(&mut s.still.blotches_px2, twin.still.blotches_px2, 0.0);
             for (real, twin) in s.still.lines_px2.iter_mut().zip(twin.still.lines_px2) {
@@ -83,7 +83,7 @@ impl Baseline {
         }
     }
 
-    /// Are the recording's tails no heavier than those of the simulation, by much?
+    /// Whether the recording's tails are not much heavier than the simulation's.
     pub fn tails_alike(&self, real: &[Structure]) -> bool {
         let tail = |all: &[Structure]| {
             mean(all.iter().filter(|s| s.tails.n > 0.0).map(|s| s.tails.share())).unwrap_or(0.0)
@@ -91,7 +91,7 @@ impl Baseline {
         tail(real) < TAILS_ALIKE * tail(&self.structure)
     }
 
-    /// Is as much lost of the targets on the whole as in the simulated views?
+    /// Whether about as much of the targets is lost as in the simulated views.
     pub fn loses_alike(&self, real: &Survey) -> bool {
         let shares = [real, &self.survey].map(lost_share);
         let [less, more] = range(shares);
@@ -113,14 +113,14 @@ impl Baseline {
     }
 }
 
-/// Steps that differ by less are the same, as a logarithm.
+/// Largest log ratio of steps that are the same.
 const STEPS_ALIKE: f64 = 0.05;
-/// Lost shares that differ by less than this factor, and this much, are the same: what lies at the range's
-/// end is lost or not by chance.
+/// Lost shares within this factor, plus this difference, are the same: at the end of the
+/// range, what is lost is chance.
 const LOSSES_ALIKE: f64 = 1.2;
 const NEGLIGIBLE_DROPOUT: f64 = 0.0005;
 
-/// Of all that was asked of the target's pixels.
+/// Lost share of all readings asked of the target's pixels.
 fn lost_share(survey: &Survey) -> f64 {
     let tiles = || survey.views.iter().flat_map(|v| v.tiles.iter());
     let asked: f64 = tiles().map(|t| t.asked).sum();

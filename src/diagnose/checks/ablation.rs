@@ -1,4 +1,4 @@
-//! The engine with one of its parts taken out, to show what that part is for. Only tests ask for it.
+//! The engine with one of its parts disabled, to show what that part is for. Used by tests only.
 
 use crate::diagnose::options::Ablation;
 use crate::diagnose::search::rules::Rules;

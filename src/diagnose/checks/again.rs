@@ -1,6 +1,6 @@
-//! The battery once more, against the extended model: the same layers and thresholds on the same
-//! views, with everything that was found taken out of the residuals in memory. What no model changes,
-//! losses and the words' steps, is the first run's.
+//! Runs the battery again, against the extended model: the same layers, thresholds and views, with everything
+//! found subtracted from the residuals in memory. Losses and steps of the raw values, which no model changes,
+//! are those of the first run.
 
 use crate::diagnose::battery::Battery;
 use crate::diagnose::case::Case;
@@ -12,8 +12,8 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::model::{Effect, NoiseModel};
 
 impl<'a> Case<'a> {
-    /// What stands out against `extended`, and the views with their means as they were; the first run
-    /// `explained` so many nats.
+    /// What stands out against `extended`, and the case with its means restored; the first run `explained` so
+    /// many nats.
     pub fn after<'b>(mut self, extended: &'b NoiseModel, explained: f64) -> (After, Case<'b>)
     where
         'a: 'b,
@@ -37,9 +37,9 @@ impl<'a> Case<'a> {
         (after(&battery, explained), case)
     }
 
-    /// What the extended model has beyond the one that was given, as terms.
+    /// Terms that the extended model adds to the given one.
     fn added(&self, extended: &NoiseModel) -> KnownTerms {
-        // Words that are ranges were read as such.
+        // Raw values that are ranges were read as such.
         let read = |e: &Effect| self.ranges.is_some() && e.id == "range-not-depth";
         let mut beyond = extended.clone();
         beyond.effects.drain(..self.model.effects.len());
@@ -48,8 +48,8 @@ impl<'a> Case<'a> {
     }
 }
 
-/// Residuals without `bias`, px by pixel. Means of whole frames are compared with one another alone,
-/// and keep what all frames share.
+/// Subtracts `bias` (px by pixel) from the residuals. Means of whole frames are only compared with one
+/// another, and keep what all frames share.
 fn take_out(field: &mut Field, bias: &[f32]) {
     let both = field.mean.iter_mut().zip(&mut field.square);
     for ((mean, square), b) in both.zip(bias) {

@@ -1,4 +1,4 @@
-//! A recording that is far from the model, though no search found what its views have in common.
+//! Detects a recording far from the model, even if no search found what its views have in common.
 
 use super::rms::rms_by_view;
 use crate::diagnose::diagnosis::{Finding, Size};
@@ -8,13 +8,13 @@ use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Axis, Statistic};
 
-/// One view may show something else: two, and a quarter of all.
+/// At least two views, and a quarter of all: a single one may show something else.
 const MIN_VIEWS: usize = 2;
 const SHARE: usize = 4;
 
-/// Beyond the clip a residual is no noise, and noise that is as much smaller or larger than the model's is
-/// another sensor's. A mean over thousands of readings in a quarter of the views is no match, whatever it
-/// is: a search needs views that agree, and few of them never do for sure.
+/// Finds a recording whose mean residuals, or whose noise over the model's, are beyond the clip in a quarter
+/// of the views. Such residuals are no noise, and such noise is another sensor's: a mismatch, whatever its
+/// cause. A search needs views that agree, and few views never do for sure.
 pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
     let limit = f64::from(CLIP_SIGMAS);
     let sigma_px = survey.views.iter().map(|view| {
@@ -37,7 +37,7 @@ pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
         let words = format!("The views' mean errors are {sigma:.0} times the noise of a pixel");
         return Some(found(sigma, words, Statistic::Bias));
     }
-    // Of a view's noise over the model's.
+    // Ratio of a view's noise to the model's.
     let factor = |view: &ViewData| Some((0.5 * view.level()?.0).exp());
     let factors: Vec<f64> = survey.variance_data().iter().filter_map(factor).collect();
     let larger = reached(factors.clone()).filter(|f| *f > limit);
@@ -51,7 +51,7 @@ pub fn far_off(survey: &Survey, sigma_mm: f64) -> Option<Finding> {
     Some(found(sigma, words, Statistic::Variance))
 }
 
-/// What two of the views and a quarter of them are beyond, at least.
+/// Value that at least two of the views, and a quarter of them, reach.
 fn reached(mut of_views: Vec<f64>) -> Option<f64> {
     of_views.retain(|x| x.is_finite());
     of_views.sort_by(|a, b| b.total_cmp(a));

@@ -1,4 +1,4 @@
-//! What the found terms are worth on views that had no part in any choice.
+//! Scores the found terms on held-out views, which had no part in any choice.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -15,14 +15,14 @@ use crate::diagnose::views::field::Field;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Statistic, Term};
 
-/// A share of the views is kept aside.
+/// One view in this many is held out.
 const KEPT_ASIDE: usize = 4;
-/// With fewer views than this none can be spared.
+/// Fewest views from which any can be spared.
 const MIN_VIEWS: usize = 6;
 
 impl Case<'_> {
-    /// Choose again without some views, and score those. The errors of single `lines` and textures are learnt
-    /// again without them where all views together show such.
+    /// Repeats the search without some views, and scores those. The errors of single `lines` and textures are
+    /// learnt again without them, where all views together show such.
     pub(in crate::diagnose) fn heldout(
         &self,
         lines: &[LearntLines],
@@ -90,7 +90,8 @@ impl Case<'_> {
         })
     }
 
-    /// What lines of these axes, learnt on the `rest` beside its `bias`, bring to each of the views kept `aside`.
+    /// Gain of lines along these axes, learnt on the `rest` beside its `bias`, on each of the views held out
+    /// (`aside`).
     fn gained_by_lines(
         &self,
         lines: &[LearntLines],
@@ -123,15 +124,15 @@ impl Case<'_> {
     }
 }
 
-/// What taking out the errors of single lines brings to a view.
+/// Gain of subtracting the errors of single lines from a view.
 #[derive(Clone, Copy, Default)]
 struct LinesGain {
     nats: f64,
-    /// Off the sum of squares of its pixels.
+    /// Reduction of the sum of squares of its pixels.
     px2: f64,
 }
 
-/// Of the means, about a plane of the view's own: -r'Wr / 2, nats.
+/// Log score of the means about a plane of the view's own: -r'Wr / 2, nats.
 fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
     let response = view.without(terms);
     let own: f64 = response.iter().zip(&view.weight).map(|(y, w)| w * y * y).sum();
@@ -139,15 +140,15 @@ fn log_score(view: &ViewData, terms: &[Term]) -> Option<f64> {
     Some(-0.5 * (own - rows.explained()))
 }
 
-/// Of the size of the noise, block by block: minus half the deviance of sums of squares (a gamma distribution), nats.
-/// A view's level counts as well: who uses the model has no other sigma. Beside a simulation, whose blocks err as much,
-/// their weight is of the ratio.
+/// Log score of the noise, block by block: minus half the deviance of sums of squares (a gamma distribution),
+/// nats. A view's level counts too, since a user of the model has no other sigma. Beside a simulation, whose
+/// blocks err as much, the weights are those of the ratio.
 fn noise_score(blocks: &ViewData, terms: &[Term]) -> f64 {
     let left = blocks.without(terms);
     -left.iter().zip(&blocks.weight).map(|(log, w)| w * (log.exp_m1() - log)).sum::<f64>()
 }
 
-/// 95 % of the mean, by resampling.
+/// 95 % bootstrap interval of the mean.
 fn bootstrap(values: &[f64], rng: &mut crate::rng::Stream) -> [f64; 2] {
     const RESAMPLES: usize = 2000;
     let n = values.len();

@@ -1,4 +1,5 @@
-//! What a finding must stand: views kept aside, halves, the same tests again; what the model has too much, and what could have been seen.
+//! Checks of the findings: held-out views, replication in halves, a second run, excess terms of the model,
+//! and power.
 
 pub mod ablation;
 pub mod again;

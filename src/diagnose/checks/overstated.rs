@@ -1,7 +1,7 @@
 //! Effects that the model has and the recording does not show.
 //!
-//! What is known is taken out before anything is looked for, so that too much of it would pass: each
-//! is held against the views by what it would do to them. The views are the sample.
+//! Known effects are subtracted before the search, so an overstated one would pass. Each is compared with the
+//! views by what it would do to them. The views are the sample.
 
 use super::textures::beyond;
 use crate::diagnose::case::Case;
@@ -22,12 +22,12 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::tiles::Tile;
 use crate::terms::{Axis, PixelContext, Statistic};
 
-/// The recording shows less than this share of it. Sensors warm up, and views differ.
+/// Share of an effect below which the recording contradicts it. Sensors warm up, and views differ.
 pub const SHARE: f64 = 0.5;
-/// Readings that must be lost in a view by the model for it to say something.
+/// Readings that a view must lose by the model in order to count.
 const LOST: f64 = 10.0;
 
-/// What an effect of the model does by itself, as the views show it.
+/// An effect of the model, and what the views show of it.
 pub struct Claim {
     pub id: &'static str,
     pub statistic: Statistic,
@@ -35,12 +35,12 @@ pub struct Claim {
     /// Mean over the views; the claim is contradicted below `half`.
     pub seen: ViewMean,
     pub half: f64,
-    /// In units of the noise's standard deviation.
+    /// Size in standard deviations of the noise.
     pub size_sigma: f64,
 }
 
 impl Case<'_> {
-    /// What the model has more than twice of.
+    /// Effects of which the model has more than twice what the views show.
     pub(in crate::diagnose) fn overstated(&self, scatter: &ScatterResult) -> Vec<Finding> {
         // A simulated recording shows what its model does; the two are compared view by view.
         if self.baseline.is_some() {
@@ -52,7 +52,7 @@ impl Case<'_> {
         let claims = claims.into_iter().chain(self.tails_claimed(&scatter.structure));
         let claims = claims.chain(self.edges_claimed()).chain(self.losses_claimed());
         let told = |c: Claim| {
-            // Chance that views of a sensor which has half of it show as little.
+            // Probability that views of a sensor with half of the effect show as little.
             let p = c.seen.p_below(c.half);
             let size = Size { mm: c.size_sigma * sigma_mm, sigma: c.size_sigma };
             let finding = finding(&self.known, c.id, c.statistic, c.axis);
@@ -71,7 +71,7 @@ impl Case<'_> {
     fn tails_claimed(&self, views: &[Structure]) -> Option<Claim> {
         let mixture = Mixture::of(&self.known)?;
         let (seen, half) = match mixture.width() {
-            // Outliers so frequent are the noise itself, which is as wide as they are.
+            // Outliers this frequent are the noise itself, which is as wide as they are.
             width if width > 2.0 => {
                 let sigma_px = typical_sigma_px(&self.fields);
                 let seen = ViewMean::of(views, |s| Some(s.variance_px2 / sigma_px.powi(2)))?;
@@ -104,7 +104,7 @@ impl Case<'_> {
         mixing.into_iter().chain(shadow).collect()
     }
 
-    /// What is lost of that which the model loses.
+    /// Share of the model's losses that the views show.
     fn losses_claimed(&self) -> Vec<Claim> {
         let of = |step: Step| {
             let expected =
@@ -122,7 +122,7 @@ impl Case<'_> {
     }
 }
 
-/// Each with its parameter, and what is measured of it.
+/// Id, parameter and axis of each texture.
 const TEXTURES: [(&str, &str, Axis); 6] = [
     ("fixed-pattern-noise", "sigma_px", Axis::Pixel),
     ("row-noise", "sigma_px", Axis::Row),
@@ -137,7 +137,7 @@ fn textures(views: &[Structure], known: &KnownTerms) -> Vec<Claim> {
     let one = |&(id, name, axis): &(&'static str, &str, Axis)| {
         let size = known.parameter(id, name).filter(|size| *size > 0.0)?;
         let seen = ViewMean::of(views, beyond(id, known)?)?;
-        // A window is told as a logarithm, the others as variances or shares.
+        // The window is compared as a logarithm, the others as variances or shares.
         let (half, size_sigma) = match name {
             "sigma_px" => (-SHARE * size * size, size / sigma_px),
             "length_px" => (SHARE.ln(), 1.0),

@@ -1,11 +1,10 @@
-//! How small an effect a recording could have shown: what size of a shape a layer's search would see in
-//! 80 % of such recordings.
+//! Detection power: the size of a shape that a layer's search would find in 80 % of such recordings.
 //!
-//! The gates are those of the search itself, but for whether halves of the views agree, and on patches of
-//! two tiles: the threshold of the null over the dispersion of the views, the share of what was found
-//! first, and the size beside the largest. Of a shape of size s with the information I a view that was not
-//! in the fit tells s^2 I / 2 nats, give or take s sqrt(I d) with the dispersion d, less d / 2 for each
-//! coefficient that is fitted.
+//! The criteria are those of the search itself, without replication in halves, and on patches of two tiles:
+//! the null threshold for the gain over the views' dispersion, the share of the first finding's gain, and the
+//! size relative to the largest. For a shape of size s with information I, a view that was not in the fit
+//! gains s^2 I / 2 nats, with standard deviation s sqrt(I d) at dispersion d, less d / 2 per fitted
+//! coefficient.
 
 use nalgebra::DVector;
 use serde_json::{Map, Value, json};
@@ -32,14 +31,14 @@ pub struct DetectionCriteria<'a> {
     pub scene: &'a Scene<'a>,
     pub outcome: &'a Outcome,
     pub rules: Rules,
-    /// Fitted beside everything.
+    /// Basis fitted beside everything.
     pub beside: Option<Basis>,
 }
 
 impl DetectionCriteria<'_> {
-    /// Multiple of the term, which is of size one, that is seen; `None` where none is.
+    /// Smallest detected multiple of `unit`, a term of size one; `None` where there is none.
     pub fn min_size(&self, unit: &Term) -> Option<f64> {
-        // Beside sigma's own refit, what follows depth and tilt alone is not looked for.
+        // With sigma refitted, what depends on depth and tilt alone is not searched for.
         if self.beside.is_some() && !beyond_sigma(&Candidate::curve(unit.basis.clone())) {
             return None;
         }
@@ -66,7 +65,7 @@ impl DetectionCriteria<'_> {
         Some(by_gain.max(by_size)).filter(|size| *size > 0.0 && size.is_finite())
     }
 
-    /// The views without what was found: it would not be taken for an effect more.
+    /// The views with the findings subtracted: these would not be taken for a further effect.
     fn left(&self) -> Vec<ViewData> {
         let found = terms_of(self.outcome, self.scene.statistic);
         let left = |view: &ViewData| ViewData { response: view.without(&found), ..view.clone() };
@@ -75,7 +74,7 @@ impl DetectionCriteria<'_> {
 }
 
 impl Case<'_> {
-    /// The least parameter of each family that would be found with 80 % power.
+    /// Smallest parameter of each family that would be found with 80 % power.
     pub(in crate::diagnose) fn detectable(
         &self,
         [mean, size]: &[Scene<'_>; 2],

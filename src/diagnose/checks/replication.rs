@@ -1,8 +1,8 @@
-//! Do two halves of the views, each alone, say the same? The plainest certificate there is.
+//! Replication: whether two halves of the views, each alone, show the same.
 //!
-//! The views are split once, alike in distance and tilt. A finding replicates where the shape that
-//! all views gave it has the same sign in both halves, sizes that agree inside their joint 95 %
-//! interval, and is seen by one half alone along the shape that the other half gave it.
+//! The views are split once, balanced in distance and tilt. A finding replicates where both halves have the
+//! shape of the fit to all views with the same sign and with sizes that agree within their joint 95 %
+//! interval, and where one half alone detects the shape that the other half gave.
 
 use std::ops::Range;
 
@@ -13,16 +13,17 @@ use crate::diagnose::search::evidence::Evidence;
 use crate::solve::Cholesky;
 use crate::stats::student_quantile;
 
-/// Standard errors from which on a half sees something by itself.
+/// Standard errors from which a half detects something by itself.
 const SEEN: f64 = 2.0;
-/// What a half knows by less than this share of what all views know, it tells nothing of.
+/// Ridge on a half's own shape, as a share of the information of all views: a half tells nothing of what it
+/// knows less well.
 const MIN_KNOWN: f64 = 0.1;
-/// Two-sided.
+/// Two-sided coverage.
 const INTERVAL: f64 = 0.95;
-/// Views that are neighbours in distance; these are dealt out by tilt.
+/// Views per group of neighbouring distances; the group is split by tilt.
 const NEIGHBOURS: usize = 4;
 
-/// Which half each view belongs to, from its distance and tilt.
+/// Half of each view, by its distance and tilt; `true` is the second.
 pub fn halves(poses: &[(f64, f64)]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..poses.len()).collect();
     order.sort_by(|&a, &b| poses[a].0.total_cmp(&poses[b].0));
@@ -30,7 +31,7 @@ pub fn halves(poses: &[(f64, f64)]) -> Vec<bool> {
     for (k, near) in order.chunks_mut(NEIGHBOURS).enumerate() {
         near.sort_by(|&a, &b| poses[a].1.total_cmp(&poses[b].1));
         for (place, &view) in near.iter().enumerate() {
-            // The outer two of four, then the inner two: tilts balance within the group.
+            // The outer two of four against the inner two, in turn: tilts balance within the group.
             second[view] = matches!(place, 1 | 2) != (k % 2 == 1);
         }
     }
@@ -43,7 +44,7 @@ impl ViewMean {
     }
 }
 
-/// Same sign, and sizes inside their joint interval.
+/// Whether the signs are the same, and the sizes inside their joint interval.
 fn alike(halves: &[ViewMean; 2]) -> bool {
     let [a, b] = halves;
     let freedom = (a.views.round() + b.views.round() - 2.0).max(1.0);
@@ -52,13 +53,13 @@ fn alike(halves: &[ViewMean; 2]) -> bool {
     a.value * b.value > 0.0 && apart <= reach * a.std_error.hypot(b.std_error)
 }
 
-/// Two sizes of one statistic. `None` where a half has too few views for an error.
+/// Whether two sizes of one statistic agree, one being significant. `None` where a half has too few views.
 pub fn agree(halves: [Option<ViewMean>; 2]) -> Option<bool> {
     let [Some(a), Some(b)] = halves else { return None };
     Some(alike(&[a, b]) && a.z().abs().max(b.z().abs()) > SEEN)
 }
 
-/// All terms of a layer as each half has them, fitted together.
+/// All terms of a layer, fitted together in each half.
 pub struct Halves {
     /// Information of all views.
     pub metric: DMatrix<f64>,
@@ -68,7 +69,7 @@ pub struct Halves {
     pub spans: Vec<Range<usize>>,
 }
 
-/// The columns of terms that have so many each, one after the other.
+/// Column ranges of consecutive terms, given their numbers of columns.
 pub fn spans(counts: &[usize]) -> Vec<Range<usize>> {
     let mut first = 0;
     let span = |&count: &usize| {
@@ -78,19 +79,19 @@ pub fn spans(counts: &[usize]) -> Vec<Range<usize>> {
     counts.iter().map(span).collect()
 }
 
-/// What one half says.
+/// Fit to one half.
 pub struct Half {
     pub beta: DVector<f64>,
-    /// Information plus what the priors hold.
+    /// Information plus the precision of the priors.
     pub precision: DMatrix<f64>,
-    /// The precision's.
+    /// Cholesky factor.
     pub factor: Cholesky,
-    /// Every view's score beyond that fit.
+    /// Score of every view beyond that fit.
     pub beyond: Vec<DVector<f64>>,
 }
 
 impl Half {
-    /// The fit by this precision to a `score`; `beyond` are the views' scores beyond it.
+    /// Solves for a `score` with this precision; `beyond` gives the views' scores beyond the fit.
     pub fn of(
         precision: DMatrix<f64>,
         score: &DVector<f64>,
@@ -101,7 +102,7 @@ impl Half {
         Some(Half { beyond: beyond(&beta), beta, precision, factor })
     }
 
-    /// A weighted sum of the coefficients; errors from the views' scatter where that is the larger.
+    /// Weighted sum of the coefficients. Its error is that of the views' scatter where this is larger.
     fn measured(&self, weights: &DVector<f64>) -> Option<ViewMean> {
         let n = self.beyond.len() as f64;
         let reach = self.factor.solve(weights);
@@ -113,7 +114,7 @@ impl Half {
 }
 
 impl Halves {
-    /// From the views' evidence on all terms together; `counts` are the terms' columns.
+    /// Fits both halves to the views' evidence on all terms; `counts` are the terms' columns.
     pub fn of(views: &[Evidence], second: &[bool], prior: f64, counts: &[usize]) -> Option<Self> {
         let n = views.first()?.b.len();
         if views.len() != second.len() || !second.contains(&true) {
@@ -135,29 +136,30 @@ impl Halves {
         Some(Halves { metric, whole, halves, spans: spans(counts) })
     }
 
-    /// Do both halves have these terms, taken as one shape? No formula is exact: each half may be off by
-    /// this share of the size beside its own error. `None` where the terms have no columns of their own, or
-    /// a half has too few views.
+    /// Whether both halves have these terms, taken as one shape. No formula is exact: each half may be off by
+    /// `formula_error` of its size beside its own error. `None` where the terms have no columns of their own,
+    /// or a half has too few views.
     pub fn replicate(&self, terms: &[usize], formula_error: f64) -> Option<bool> {
         Some(self.shown(terms)?.replicates(formula_error))
     }
 
-    /// The same of curves without a name, which are what the other terms leave: these are as all views have
-    /// them.
+    /// Same for nameless curves, which are what the other terms leave: those are held at the fit to all
+    /// views.
     pub fn replicate_beside(&self, terms: &[usize]) -> Option<bool> {
         Some(self.shown_beside(terms)?.replicates(0.0))
     }
 
-    /// Does neither half show what the other has, or each the opposite, beside the other terms? Sizes that
-    /// differ are no contradiction: of true ones a twentieth lie outside their interval, and sensors warm up.
+    /// Whether, with the other terms held, neither half shows what the other has or their signs are opposite.
+    /// Sizes that differ are no contradiction: a twentieth of true ones lie outside their interval, and
+    /// sensors warm up.
     pub fn contradict(&self, terms: &[usize]) -> bool {
         let opposite = |sizes: &[ViewMean; 2]| sizes[0].value * sizes[1].value <= 0.0;
         self.shown_beside(terms).is_some_and(|s| opposite(&s.sizes) || s.seen() <= SEEN)
     }
 
-    /// What each half has along the very shape, all other terms being as all views have them: of terms that
-    /// nearly say the same, and of nodes that a half hardly sees, each half makes another part. Of its own
-    /// shape it tells what it knows.
+    /// Sizes in each half with all other terms held at the fit to all views. Otherwise the halves would split
+    /// nearly collinear terms, and nodes that they hardly see, each in its own way. A half's own shape is
+    /// shrunk to what it knows.
     fn shown_beside(&self, terms: &[usize]) -> Option<Shown> {
         let columns = self.columns(terms);
         let of = |v: &DVector<f64>| DVector::from_fn(columns.len(), |i, _| v[columns[i]]);
@@ -198,7 +200,7 @@ impl Halves {
         if columns.is_empty() {
             return None;
         }
-        // How far a fit reaches along a shape, the shape itself being one.
+        // Weights for the size of a fit along a shape, the shape itself being one.
         let along = |shape: &DVector<f64>| {
             let mut own = DVector::zeros(shape.len());
             columns.iter().for_each(|&c| own[c] = shape[c]);
@@ -217,16 +219,16 @@ impl Halves {
     }
 }
 
-/// What halves have of a shape.
+/// Sizes of a shape in the two halves.
 struct Shown {
-    /// Of the common one, each.
+    /// Each half's size of the common shape.
     sizes: [ViewMean; 2],
-    /// Of the other half's, each.
+    /// Of the other half's shape.
     others: [ViewMean; 2],
 }
 
 impl Shown {
-    /// How clearly the better seen of them shows what the other has, in standard errors.
+    /// Significance of the other half's shape in the half that shows it better, in standard errors.
     fn seen(&self) -> f64 {
         self.others[0].z().max(self.others[1].z())
     }

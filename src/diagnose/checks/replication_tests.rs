@@ -16,12 +16,12 @@ fn halves_are_alike_in_distance_and_tilt() {
         approx::assert_abs_diff_eq!(mean(|p| p.0), 2.25, epsilon = 1e-12);
         approx::assert_abs_diff_eq!(mean(|p| p.1), 0.45, epsilon = 1e-12);
     }
-    // The order in which views come changes nothing.
+    // The order of the views does not matter.
     let turned: Vec<(f64, f64)> = poses.iter().rev().copied().collect();
     assert!(halves(&turned).iter().rev().eq(&second));
 }
 
-/// Views that each tell `k` coefficients to a standard error of one: `truth` gives a view's own.
+/// Views that each determine `k` coefficients to a standard error of one; `truth` gives a view's own value.
 fn views(
     k: usize,
     truth: impl Fn(usize) -> f64,
@@ -46,8 +46,8 @@ fn share(k: usize, truth: impl Fn(usize) -> f64) -> f64 {
     std::iter::repeat_with(replicates).take(400).filter(|r| *r).count() as f64 / 400.0
 }
 
-/// One coefficient, and as many as a map has; noise passes one time in ten at most, what all views
-/// have always but for the interval's twentieth, what only one half has never.
+/// For one coefficient, and for as many as a map has: noise replicates at most one time in ten, a common
+/// cause always but for the interval's twentieth, and what only one half has never.
 #[test]
 fn noise_does_not_replicate_and_a_common_cause_does() {
     for k in [1, 40] {
@@ -59,8 +59,8 @@ fn noise_does_not_replicate_and_a_common_cause_does() {
     }
 }
 
-/// What all views have is never contradicted, though its size is by chance apart in a twentieth of
-/// cases, or truly is; noise mostly is.
+/// A common effect is never contradicted, though its sizes differ by chance in a twentieth of cases, or truly
+/// do; noise mostly is.
 #[test]
 fn halves_of_other_sizes_do_not_contradict_each_other() {
     let contradicted = |truth: &dyn Fn(usize) -> f64| {
@@ -76,11 +76,11 @@ fn halves_of_other_sizes_do_not_contradict_each_other() {
     assert!(contradicted(&|_| 0.0) > 320, "{}", contradicted(&|_| 0.0));
 }
 
-/// Draws views from normal numbers; and the columns of each term.
+/// Draws views from normal numbers, with the columns of each term.
 type Draw<'a> = &'a dyn Fn(&mut dyn FnMut() -> f64) -> (Vec<Evidence>, Vec<usize>);
 
-/// Views of two terms that differ by a thousandth: what a half gives the one it takes from the other.
-/// And views of twelve columns of which those of either half see eight, four of them alone.
+/// Views of two terms that differ by a thousandth, where a half gives to one what it takes from the other.
+/// And views of twelve columns, of which those of either half see eight, four of them alone.
 #[test]
 fn halves_that_share_out_or_see_parts_do_not_contradict_each_other() {
     let mut rng = Seed(11).stream("replication/parts");

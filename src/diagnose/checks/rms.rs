@@ -1,4 +1,4 @@
-//! Residuals of the views with terms taken out, about a plane that is fitted anew: their root mean squares.
+//! RMS residuals of the views with terms subtracted, about a plane that is fitted anew.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -9,8 +9,8 @@ use crate::diagnose::views::tiles::Tile;
 use crate::solve::plane_through;
 use crate::terms::{PixelContext, Term};
 
-/// Root mean square of every pixel of every frame, px, the sum of squares being so much less by lines, and of the
-/// smooth residual, mm.
+/// RMS over every pixel of every frame, px, with the sum of squares reduced by `less_px2` for the lines; and
+/// RMS of the smooth residual, mm.
 pub fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64, less_px2: f64) -> [f64; 2] {
     let (mut px, mut mm, mut n) = (0.0, 0.0, 0.0);
     for view in views {
@@ -24,12 +24,12 @@ pub fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64, less_px2: f6
     [((px - less_px2).max(0.0) / n).sqrt(), (mm / n).sqrt()]
 }
 
-/// Of a patch's readings about `f`, px^2.
+/// Sum of squares of a patch's readings about `f`, px^2.
 fn squares_about(t: &Tile, f: f64) -> f64 {
     t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0)
 }
 
-/// What each view's disparity on the optical axis changes by once the terms are taken out, px.
+/// Change in each view's disparity on the optical axis once the terms are subtracted, px.
 pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
     let level = |v: &SurveyedView| plane_left(v, &values(v, terms)).map_or(0.0, |p| p[0]);
     survey.views.par_iter().map(level).collect()
@@ -39,10 +39,10 @@ fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     view.places.iter().map(|place| Term::sum(terms, place)).collect()
 }
 
-/// The terms' values at the patches, with the plane fitted anew.
+/// Values of the terms at the patches, with the plane fitted anew.
 fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     let mut values = values(view, terms);
-    // What is left after the terms has a plane of its own: it goes with them.
+    // What the terms leave has a plane of its own, which is subtracted with them.
     if let Some(plane) = plane_left(view, &values) {
         for (place, f) in view.places.iter().zip(&mut values) {
             *f += plane[0] + plane[1] * place.x + plane[2] * place.y;
@@ -51,13 +51,13 @@ fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     values
 }
 
-/// The plane that is left in a view's means without these values.
+/// Plane left in a view's means without these values.
 fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<Vector3<f64>> {
     let points = view.patches().zip(values);
     plane_through(points.map(|((p, t), f)| ([p.x, p.y], t.mean - f, t.pixels)))
 }
 
-/// Every patch that has a mean, with the terms' value there, the plane fitted anew.
+/// Visits every patch that has a mean, with the terms' value there, the plane fitted anew.
 fn each_patch(
     view: &SurveyedView,
     terms: &[Term],
@@ -68,7 +68,7 @@ fn each_patch(
     patches.for_each(|(patch, f)| visit(patch, f));
 }
 
-/// Root mean square of each view's mean residual with the terms taken out, px.
+/// RMS of each view's mean residual with the terms subtracted, px.
 pub fn rms_by_view(survey: &Survey, terms: &[Term]) -> Vec<f64> {
     survey
         .views

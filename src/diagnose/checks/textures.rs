@@ -1,5 +1,5 @@
-//! Does either half of the views show the same texture, and do views kept aside? Each view is one sample of the
-//! statistic that a finding rests on.
+//! Tests textures in halves of the views and on held-out views. Each view is one sample of the statistic that
+//! a finding rests on.
 
 use super::replication::agree;
 use crate::diagnose::edges::Edges;
@@ -19,7 +19,8 @@ use crate::terms::{Axis, Statistic};
 /// A view's value beyond what the model has, in the statistic's own unit.
 type OfView<'a> = Box<dyn Fn(&Structure) -> Option<f64> + 'a>;
 
-/// `None` where the finding is no mean of all views, or a half has too few of them.
+/// Whether both halves show it. `None` where the finding is no mean of all views, or a half has too few of
+/// them.
 pub fn replicated(
     found: &TextureFinding,
     structure: &[Structure],
@@ -48,7 +49,8 @@ pub fn replicated(
     agree([half(false), half(true)])
 }
 
-/// What named textures and tails, learnt on the `rest` of the views, bring to each of those kept `aside`: nats.
+/// Gain of named textures and tails, learnt on the `rest` of the views, on each of those held out (`aside`),
+/// nats.
 pub fn gained(
     ScatterResult { structure, textures, tails, .. }: &ScatterResult,
     known: &KnownTerms,
@@ -56,7 +58,7 @@ pub fn gained(
 ) -> Vec<f64> {
     let mut gains = vec![0.0; aside.len()];
     let variance_px2 = variance_px2(structure);
-    // What has no name is in no model, and what some views have is no mean of all.
+    // A nameless texture is in no model, and one of some views is no mean of all.
     let named = textures.iter().filter(|t| !t.families.is_empty());
     for texture in named.chain(tails).filter(|t| t.of_some.is_none()) {
         let Some(beyond) = beyond_known(texture, known) else { continue };
@@ -70,7 +72,7 @@ pub fn gained(
     gains
 }
 
-/// A view's value with what it counts by, as for the finding.
+/// A view's value, and the size that gives its weight.
 fn sized(
     found: &TextureFinding,
     beyond: &OfView,
@@ -85,14 +87,15 @@ fn sized(
     Some((beyond(s).filter(|x| x.is_finite())?, size))
 }
 
-/// What a finding is told by, view by view.
+/// Statistic of a view that a finding rests on.
 fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfView<'a>> {
     Some(match (found.families.first().copied(), found.axis, found.statistic) {
-        // A part of the noise alone is seen in near pixels, all of it in the window's side.
+        // If only part of the noise is correlated it shows in neighbouring pixels, if all of it in the
+        // window.
         (Some("spatial-correlation"), ..) if found.size_sigma < 1.0 => {
             Box::new(|s| s.neighbour_correlation)
         }
-        // Beside what stands still, which the finding is told without.
+        // Less what stands still, which the finding leaves out too.
         (Some("temporal-correlation"), ..) => Box::new(|s| Some(s.lagged[0]? - later(s)?)),
         (Some("heavy-tails"), ..) if found.are_weak_tails() => {
             Box::new(|s| s.excess()?.into_iter().min_by(f64::total_cmp))
@@ -113,7 +116,7 @@ fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfV
     })
 }
 
-/// A view's texture of this name beyond what the model has of it.
+/// A view's texture of this name, beyond what the model has of it.
 pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
     let parameter = |name: &str| known.parameter(id, name).unwrap_or(0.0);
     let (px2, fraction, rho) =

@@ -1,4 +1,4 @@
-//! Laws that distances may be off by, fitted to views whose distance was measured by other means.
+//! Laws of distance error, fitted to views whose distance was measured by other means.
 
 use nalgebra::DVector;
 
@@ -10,48 +10,48 @@ use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::null::Null;
 use crate::terms::Axis;
 
-/// A law that the distances may be off by.
+/// A law of distance error.
 pub struct Law {
     pub family: &'static str,
     pub axis: Axis,
-    /// Of the axis.
+    /// Range of the axis.
     pub reach: [f64; 2],
-    /// What it makes of the depth, m and in sigmas.
+    /// RMS change of the depth, m and in sigmas.
     pub rms_m: f64,
     pub rms_sigma: f64,
-    /// The same in errors of a reference.
+    /// Same, in errors of a reference.
     pub rms_errors: f64,
-    /// What settles its shape, each with its standard error.
+    /// Parameters that determine its shape, each with its standard error.
     pub settled: Vec<(&'static str, [f64; 2])>,
     /// Nats.
     pub gain: f64,
-    /// Its coefficient, and the standard error.
+    /// Coefficient and its standard error.
     pub estimate: [f64; 2],
     pub null: Null,
-    /// Degrees of freedom that the references' own error was measured with.
+    /// Degrees of freedom of the estimate of the references' error.
     pub freedom: f64,
-    /// Both halves of the references say the same.
+    /// Whether both halves of the references say the same.
     pub replicated: Option<bool>,
 }
 
-/// Fewer references than this can be fitted by anything.
+/// Fewest references; anything fits fewer.
 pub const MIN_VIEWS: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
-/// What else distances may be off by.
+/// Other effects on the distances.
 #[derive(Default)]
 pub struct Nuisances {
-    /// How far a bent target may lie from the place on it that was measured, at any distance, m.
+    /// Distance between a bent target and the place on it that was measured, the same at all distances, m.
     pub bent_m: f64,
-    /// Biases whose constants are open: an offset of the disparity cannot be told from them.
+    /// Biases with an undetermined constant, which cannot be told from an offset of the disparity.
     pub open: Vec<Family>,
 }
 
-/// Views with a reference, and what is fitted beside every law.
+/// Views with a reference, and the nuisance columns fitted beside every law.
 struct References<'a> {
     checked: &'a [ReferencedView],
-    /// How far each of the others moves each view by one of its unit, m.
+    /// Shift of each view by one unit of each nuisance, m.
     others: Vec<Vec<f64>>,
     scatter: Scatter,
 }
@@ -68,7 +68,7 @@ impl<'a> References<'a> {
         References { checked, others: checked.iter().map(others).collect(), scatter }
     }
 
-    /// On the others, and on a law that moves the views so far.
+    /// Evidence on the nuisances, and on a law that moves the views so far.
     fn evidence(&self, law: Option<&dyn Fn(&ReferencedView) -> f64>) -> Vec<Evidence> {
         let of = |(n, c): (usize, &ReferencedView)| {
             let law = law.map(|moves| moves(c));
@@ -82,7 +82,7 @@ impl<'a> References<'a> {
         self.checked.iter().enumerate().map(of).collect()
     }
 
-    /// The law that moves the depth by `moves` times its coefficient, m.
+    /// Fits the law that moves the depth by `moves` times its coefficient, m.
     fn law(
         &self,
         family: &'static str,
@@ -124,7 +124,7 @@ impl<'a> References<'a> {
     }
 }
 
-/// All laws, with what each gains on references left out; none where there are too few.
+/// Fits all laws, with their gains on references left out; none where there are too few references.
 pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
     if checked.len() < MIN_VIEWS {
         return Vec::new();
@@ -138,8 +138,7 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
         let warm = |c: &ReferencedView| c.without_law() * (1.0 - (-c.session_s / tau).exp());
         references.law("thermal-drift", Axis::SessionTime, warm)
     }));
-    // Wider from here on: the variance was measured with few degrees of freedom, which makes a Student's t of
-    // a Gaussian.
+    // Wider from here on: a variance estimated with few degrees of freedom makes a Student's t of a Gaussian.
     let Scatter { variances, freedom } = &mut references.scatter;
     let wider = *freedom / (*freedom - 2.0).max(1.0);
     variances.iter_mut().for_each(|v| *v *= wider);
@@ -153,7 +152,7 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
     laws
 }
 
-/// A relative error of a few percent, an offset of a few px.
+/// Prior precision of a relative error of a few per cent, or an offset of a few px.
 const PRIOR: f64 = 1.0;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! References of a target that was tilted, and read where the axis was thought to meet it.
+//! References of a tilted target, read where the axis was assumed to meet it.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -9,12 +9,12 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::rng::{Seed, Stream};
 
 const PX_M: f64 = 43.5;
-/// Of a reference, m.
+/// Standard error of a reference, m.
 const ERROR_M: f64 = 0.0008;
 
-/// Three rows of distances: faced, turned about one axis, then about the other. By two angles the axis
-/// meets the target elsewhere than was thought, and the disparity is off by `offset_px`. `order` is the
-/// place of each in the session.
+/// Three rows of distances: frontal, turned about one axis, then about the other. The axis meets the target
+/// two angles away from where it was assumed to, and the disparity is off by `offset_px`. `order` gives each
+/// view's place in the session.
 fn references(
     offset_px: f64,
     angles: [f64; 2],
@@ -43,14 +43,14 @@ fn references(
     (0..24).map(of).collect()
 }
 
-/// Names with the offset, px, beside a target bent by so much.
+/// Names found and their offsets, px, beside a target bent by this much.
 fn found(checked: &[ReferencedView], bent_m: f64) -> Vec<(Option<&'static str>, f64)> {
     let laws = laws(checked, &Nuisances { bent_m, ..Nuisances::default() });
     let found = findings(&laws, &KnownTerms::default(), 1.0, 0.003, Seed(1));
     found.iter().map(|f| (f.effect, f.value("offset_px").unwrap_or(f64::NAN))).collect()
 }
 
-/// In the order of the session they would be a drift.
+/// In the order of the session, these would look like a drift.
 #[test]
 fn a_target_read_beside_the_axis_is_no_law() {
     for seed in 0..8 {
@@ -72,7 +72,7 @@ fn an_offset_keeps_its_size_beside_it() {
     }
 }
 
-/// Where a law moves a distance by some per cent, its square is seen too.
+/// Where a law moves distances by some per cent, its square shows too.
 #[test]
 fn a_large_law_has_its_own_size() {
     let noise = |rng: &mut Stream| 0.1 * ERROR_M * rng.sample::<f64, _>(StandardNormal);
@@ -99,7 +99,7 @@ fn a_large_law_has_its_own_size() {
     }
 }
 
-/// The plane of a bent board is elsewhere than the place that was measured, at any distance.
+/// The plane of a bent board is off the place that was measured, equally at all distances.
 #[test]
 fn a_bent_target_is_no_law() {
     let mut alone = 0;
@@ -112,7 +112,7 @@ fn a_bent_target_is_no_law() {
     assert!(alone > 0, "without knowing of the bend there is no law either");
 }
 
-/// Nor does a bend hide one.
+/// A bend does not hide an offset.
 #[test]
 fn an_offset_is_seen_beside_a_bend() {
     for seed in 0..8 {
@@ -125,9 +125,9 @@ fn an_offset_is_seen_beside_a_bend() {
     }
 }
 
-/// Views whose own distance is the less sure the farther they are, as the references of two recordings
-/// that are compared: of 400 sessions of nothing 1.2 are above the level, and 7 or more have a chance of
-/// 4e-4. Were all taken to be as sure as one another it would be 23.
+/// Views whose own distance is less certain the farther they are, like the references of two recordings that
+/// are compared. Of 400 sessions without a law 1.2 exceed the level; 7 or more have a chance of 4e-4. If all
+/// counted as equally certain, 23 would.
 #[test]
 fn far_views_that_are_less_sure_are_no_law() {
     let own = |z: f64| 0.003 * z * z / 4.0;

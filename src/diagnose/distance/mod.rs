@@ -1,4 +1,4 @@
-//! Laws of the distance, where it was measured by other means.
+//! Laws of distance error, where the distance was measured by other means.
 
 pub mod laws;
 pub mod reference;

@@ -1,5 +1,4 @@
-//! What planes alone cannot tell: offset, scale and drift, where distances were measured by other
-//! means.
+//! Offset, scale and drift, which planes alone cannot determine, from distances measured by other means.
 
 use super::laws::{Law, MIN_VIEWS, Nuisances, laws};
 use super::referenced_view::referenced_views;
@@ -20,23 +19,23 @@ use crate::rng::Seed;
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, Term};
 
-/// A law must move the depth by this many errors of a reference, and by this much, m: tapes and
-/// planes are not better.
+/// Least effect of a law on the depth, in errors of a reference; `MIN_M` is the same in m. Tapes and planes
+/// are not better.
 const CLEAR_LAW_ERRORS: f64 = 1.2;
 const MIN_M: f64 = 0.0015;
-/// Names that predict as well as the best within this many nats cannot be told apart.
+/// Names that predict within this many nats of the best cannot be told apart.
 const AS_GOOD_NATS: f64 = 3.0;
 
-/// How far a bent target's plane may lie from the place on it that was measured, m: of a parabola the
-/// mean is 1.1 root mean squares from its vertex, and 2.2 from its rim.
+/// Distance between a bent target's plane and the place on it that was measured, m. The mean of a parabola is
+/// 1.1 times its RMS from the vertex, and 2.2 times from the rim.
 pub fn bent_m(found: &[Finding]) -> f64 {
     const FROM_PLACE: f64 = 2.0;
     let bent = |f: &&Finding| f.statistic == Statistic::Bias && f.axis == Axis::TargetPosition;
     1e-3 * FROM_PLACE * found.iter().filter(bent).map(|f| f.size.mm).fold(0.0, f64::hypot)
 }
 
-/// What the references tell, if anything.
-/// `excess` is how much further than by their own error the levels may be off, in variance.
+/// Findings from the references, if any.
+/// `excess` is how far the variance of the levels may exceed their own errors, as a factor.
 pub fn findings(
     laws: &[Law],
     known: &KnownTerms,
@@ -44,7 +43,7 @@ pub fn findings(
     level: f64,
     seed: Seed,
 ) -> Vec<Finding> {
-    // An error measured on few references makes a Student's t of a Gaussian.
+    // An error estimated from few references makes a Student's t of a Gaussian.
     let calibrated_gain = |l: &Law| {
         let gain = (l.gain / l.null.dispersion / excess).max(0.0);
         student(gain, l.freedom)
@@ -54,14 +53,14 @@ pub fn findings(
     };
     let nulls: Vec<&Null> = laws.iter().map(|l| &l.null).collect();
     let noise = NoiseGains::of(&nulls, Seed(seed.0 ^ 0x5eed));
-    // So large a law may be missing in the model, too, where it was learnt from references.
+    // A model learnt from references may itself lack a law of this size.
     let clear = best.rms_errors > CLEAR_LAW_ERRORS * excess.sqrt() && best.rms_m > MIN_M;
     if !clear || calibrated_gain(best) < noise.threshold(level) {
         return Vec::new();
     }
     let [beta, error] = best.estimate;
     if let Some(had) = known.law(best.family) {
-        // Sessions and references differ by a part of a law; not by half of it.
+        // Sessions and references differ by a part of a law, but not by half of it.
         let other = beta.abs() - 2.0 * error > SHARE * had.abs();
         return Vec::from_iter(other.then(|| contradicted(best, noise.p(calibrated_gain(best)))));
     }
@@ -70,7 +69,7 @@ pub fn findings(
         (family, (0.5 * (gains.fold(f64::NEG_INFINITY, f64::max) - best.gain)).exp())
     });
     odds.sort_by(|a, b| b.1.total_cmp(&a.1));
-    // No law at all explains what chance does.
+    // The last term is the odds of no law at all.
     let total: f64 = odds.iter().map(|o| o.1).sum::<f64>() + (-0.5 * best.gain).exp();
     let alternatives: Vec<Alternative> = odds
         .iter()
@@ -101,7 +100,7 @@ pub fn findings(
     }]
 }
 
-/// References that contradict what the model has of this law.
+/// Finding that the references contradict the model's law.
 fn contradicted(law: &Law, p: f64) -> Finding {
     let shape = format!(
         "the model's {} is off by {:.1} mm at the references' distances, more than half of it",
@@ -123,33 +122,34 @@ fn contradicted(law: &Law, p: f64) -> Finding {
     }
 }
 
-/// An offset of the disparity may be no more than the constant of a shape that stands still in the picture,
-/// of `usual` px, which nobody knows: within two standard deviations of it.
+/// Whether an offset of the disparity may be no more than the unknown constant of a shape fixed in the
+/// picture, of `usual` px: within two standard deviations of it.
 fn is_constant_of(law: &Finding, usual: f64) -> bool {
     const DEVIATIONS: f64 = 2.0;
     law.value("offset_px").is_some_and(|px| px.abs() < DEVIATIONS * usual)
 }
 
-/// Does the effect happen to cameras of this kind?
+/// Whether the effect occurs in cameras of this kind.
 pub fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
     effects::find(id).is_none_or(|e| e.card().applies_to(kind))
 }
 
 impl Case<'_> {
-    /// Laws of the distance, by reference distances.
+    /// Finds laws of distance error by the reference distances.
     pub(in crate::diagnose) fn laws(&self, bias: &[Term], bent_m: f64) -> Vec<Finding> {
         let ours = references(&self.fields);
         if ours < MIN_VIEWS {
             return Vec::new();
         }
-        // Only what is nothing on the optical axis by its physics tells how far the plane bent there.
+        // Only terms that vanish on the optical axis by their physics show how far the plane bent there.
         let anchored: Vec<Term> =
             bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();
-        // The catalogue's bowl is nothing there either: by that its offset is told.
+        // The catalogue's bowl vanishes there too; its offset is stated on that basis.
         let of_catalogue = |t: &&Term| t.basis.is_nothing_ahead() || t.basis.is_bowl();
         let plain: Vec<Term> = bias.iter().filter(of_catalogue).cloned().collect();
         let views = self.fields.len() as f64;
-        // The levels are off with the model's bias; and its own references, if any, left a law open.
+        // The levels carry the error of the model's bias, and its own references, if any, leave a law
+        // uncertain.
         let of_bias = self.learnt_from[0].map(|l| l.of_difference(views));
         let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
         let of_laws = theirs.map(|l| l.excess(ours as f64));
@@ -161,7 +161,7 @@ impl Case<'_> {
             let level = self.level(Self::LAWS_LEVEL);
             findings(&laws, &self.known, excess, level, self.options.seed)
         };
-        // A bowl, too, moves the plane on the axis, by a constant that nobody knows.
+        // A bowl moves the plane on the axis too, by an unknown constant.
         let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
         if !open.is_empty() {
             let laws = found(bias, &Nuisances { bent_m, open });
@@ -169,8 +169,8 @@ impl Case<'_> {
                 return laws;
             }
         }
-        // It may be all of an offset of the disparity: a law must hold with and without the bowl, be it
-        // new or the model's.
+        // All of it may be an offset of the disparity: a law must hold with and without the bowl, be that new
+        // or the model's.
         let model = self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead());
         let model: Vec<Term> = model.map(|t| t.times(-1.0)).collect();
         let closed = Nuisances { bent_m, open: Vec::new() };
@@ -188,12 +188,12 @@ impl Case<'_> {
     }
 }
 
-/// How many views have one.
+/// Number of views with a reference.
 pub fn references(fields: &[Field]) -> usize {
     fields.iter().filter(|f| f.reference_distance_m.is_some()).count()
 }
 
-/// What planes alone never tell.
+/// Effects that planes alone cannot show.
 pub fn cannot_tell(fields: &[Field], kind: Option<SensorKind>) -> Vec<CannotTell> {
     if references(fields) >= MIN_VIEWS {
         return Vec::new();

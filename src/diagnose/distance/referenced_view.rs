@@ -12,16 +12,16 @@ use crate::solve::{fit_by_svd, plane_equations};
 use crate::stats::paule_mandel;
 use crate::terms::Term;
 
-/// One view with a reference.
+/// A view with a reference distance.
 #[derive(Debug, Clone, Copy)]
 pub struct ReferencedView {
-    /// Measured, the known laws taken out, m.
+    /// Measured distance with the known laws subtracted, m.
     pub z: f64,
     /// Slope of the target, along the columns and rows.
     pub slope: [f64; 2],
-    /// That minus the reference, m.
+    /// `z` minus the reference, m.
     pub off: f64,
-    /// Standard error of what was measured, m, by the view's own noise: grows with z^2.
+    /// Standard error of `z` due to the view's own noise, m; grows with z^2.
     pub own_m: f64,
     pub session_s: f64,
     /// Disparity in px times depth.
@@ -31,19 +31,18 @@ pub struct ReferencedView {
 }
 
 impl ReferencedView {
-    /// What it would have measured without any law.
+    /// Distance that would be measured without any law, m.
     pub fn without_law(&self) -> f64 {
         self.z - self.off
     }
 
-    /// What a disparity that is too large by one px adds to the distance, m: negative.
+    /// Change in the distance by a disparity that is too large by one px, m: negative.
     pub fn moved_by_a_px(&self) -> f64 {
         -self.z * self.without_law() / self.px_m
     }
 }
 
-/// Distances with what the model knows of the laws, and the terms of the `bias` that was found, taken
-/// out.
+/// Views with a reference, with the model's known laws and the terms of the found `bias` subtracted.
 pub fn referenced_views(
     fields: &[Field],
     survey: &Survey,
@@ -56,7 +55,7 @@ pub fn referenced_views(
     views
         .filter_map(|((f, view), level)| {
             let reference_m = f.reference_distance_m?;
-            // The plane had bent towards what is now known to be a bias.
+            // The plane was bent towards what is now known to be a bias.
             let measured = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
             let session_s = f.time_s - start;
             let z = measured - known.law_m(measured, session_s, f.scale_px_m);
@@ -87,13 +86,12 @@ fn level_error_px(view: &SurveyedView) -> Option<f64> {
     Some(information.try_inverse()?[(0, 0)].sqrt()).filter(|error| error.is_finite())
 }
 
-/// Targets tilted by less, as a slope, and fewer of them than this, do not tell where they were
-/// measured.
+/// Least slope of a target that shows where it was measured; `MIN_TILTED` such targets are needed.
 const TILTED: f64 = 0.2;
 const MIN_TILTED: usize = 5;
 
-/// On a tilted target the distance depends on where the optical axis is taken to meet it: by two
-/// angles, which are fitted beside every law where there are views enough.
+/// Whether to fit two angles beside every law: on a tilted target the distance depends on where the optical
+/// axis is taken to meet it. Takes enough views.
 pub fn is_tilted(checked: &[ReferencedView]) -> bool {
     let steep = |c: &&ReferencedView| c.slope[0].hypot(c.slope[1]) > TILTED;
     checked.iter().filter(steep).count() >= MIN_TILTED && checked.len() >= 2 * MIN_TILTED
@@ -102,17 +100,17 @@ pub fn is_tilted(checked: &[ReferencedView]) -> bool {
 /// A tape is read to half a millimetre at best.
 const TAPE_M: f64 = 0.0005;
 
-/// How far references may be off.
+/// Errors of the references.
 pub struct Scatter {
-    /// Variance of each, m^2.
+    /// Variance of each reference, m^2.
     pub variances: Vec<f64>,
-    /// Degrees of freedom that it was measured with.
+    /// Degrees of freedom of the estimate.
     pub freedom: f64,
 }
 
 impl Scatter {
-    /// Of one reference by itself, m^2, beside the views' own errors: as large as it takes to explain
-    /// what the laws together leave (Paule and Mandel 1982).
+    /// Variance of one reference, m^2, beside the views' own errors: as large as it takes to explain the
+    /// residuals of all laws together (Paule and Mandel 1982).
     pub fn of(checked: &[ReferencedView]) -> Self {
         let n = checked.len();
         let span = checked.iter().map(|c| c.session_s).fold(0.0, f64::max).max(1.0);
@@ -127,7 +125,7 @@ impl Scatter {
             let own = checked.iter().map(|c| TAPE_M * TAPE_M + c.own_m * c.own_m);
             own.map(|own| own + more).collect::<Vec<f64>>()
         };
-        // What is left in square over these variances, how that falls with them, and the numbers left.
+        // Weighted sum of squared residuals, its derivative, and the degrees of freedom.
         let left = |more: f64| {
             let weights = DVector::from_iterator(n, with(more).iter().map(|v| v.recip()));
             let roots = weights.map(f64::sqrt);
@@ -171,7 +169,7 @@ mod tests {
     use crate::diagnose::views::tiles::Tile;
     use crate::terms::PixelContext;
 
-    /// White noise of .1 px on tiles that lie evenly about the axis: of the mean of all readings.
+    /// White noise of 0.1 px on tiles even about the axis: the error is that of the mean of all readings.
     #[test]
     fn the_level_of_a_view_is_as_sure_as_the_mean_of_its_readings() {
         const ACROSS: i32 = 20;

@@ -1,37 +1,37 @@
-//! How large a warm-up is and how fast, whatever its course.
+//! Size and time constant of a warm-up drift, whatever its course.
 //!
-//! A session rarely lasts until the drift has come to its end: what it comes to in the end, and when,
-//! then depends on the form of the approach. So the posterior is summed over several, and over all time
-//! constants that a sensor may have.
+//! A session rarely lasts until the drift has settled. Its final size and its time constant then depend on
+//! the form of the approach, so the posterior is summed over several forms, and over all time constants that
+//! a sensor may have.
 
 use super::referenced_view::ReferencedView;
 use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::posterior::Posterior;
 use crate::stats::even;
 
-/// The drift's size in the end and its time constant as the card's own formula fits them best, with
-/// root mean square distances of what other courses would have.
+/// Final size and time constant of the drift, as the card's own formula fits them best, with RMS deviations
+/// over the other courses.
 #[derive(Debug, Clone, Copy)]
 pub struct WarmUp {
     pub relative: [f64; 2],
     pub time_constant_s: [f64; 2],
 }
 
-/// Share of the drift that has come after so many time constants: 63 % after one. Heating of one mass,
-/// as on the card; of several, which goes on for longer; and one that ends sooner.
+/// Share of the drift reached after so many time constants, 63 % after one: heating of one mass, as on the
+/// card; of several, which takes longer; and a course that ends sooner.
 const COURSES: [fn(f64) -> f64; 3] =
     [|t| -(-t).exp_m1(), |t| t / (t + (std::f64::consts::E - 1.0).recip()), |t| (0.745 * t).tanh()];
 
-/// Time constants tried, evenly in the logarithm: from this share of the session to so many of it.
+/// Time constants tried, evenly in the logarithm; `TAU_SESSIONS` are the first and last in session lengths.
 const TAUS: usize = 240;
 const TAU_SESSIONS: [f64; 2] = [0.02, 20.0];
 /// A sensor's housing warms in a quarter of an hour, as on the card, within a factor of e or so.
 const TYPICAL_TAU_S: f64 = 900.0;
-/// Sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
+/// Prior: sensors drift by a per cent or two at most (the card's source: some mm at 1 to 2 m, in 20 min).
 const USUAL: f64 = 0.02;
 
-/// The warm-up in a session of so many seconds; `None` without a time. `evidence` is what the references
-/// say of a drift, the last of its columns, that moves each of them by so many metres for a size of one.
+/// Fits the warm-up of a session of this length; `None` for a length of zero. `evidence` gives the
+/// references' evidence on a drift, its last column, that moves each of them by so many metres per unit size.
 pub fn warm_up(
     session_s: f64,
     evidence: impl Fn(&dyn Fn(&ReferencedView) -> f64) -> Vec<Evidence>,
@@ -65,18 +65,18 @@ pub fn warm_up(
 struct Node {
     course: usize,
     tau_s: f64,
-    /// Logarithm of the marginal likelihood.
+    /// Log marginal likelihood plus log prior, nats.
     evidence: f64,
-    /// With its standard error.
+    /// Relative size and its standard error.
     relative: [f64; 2],
 }
 
-/// The drift's size by least squares, where its course is known, and how well that fits.
+/// Least-squares size of the drift for a given course, and the log marginal likelihood.
 fn size(views: &[Evidence]) -> Option<(f64, [f64; 2])> {
     let others = views.first()?.b.len() - 1;
     let Evidence { mut a, b } = Evidence::sum(others + 1, 0.0, views);
     for j in 0..=others {
-        // What stands beside is free: a whole unit of it is as likely as none.
+        // The nuisance parameters are free: their prior standard deviation is a whole unit.
         a[(j, j)] += if j == others { USUAL.powi(-2) } else { 1.0 };
     }
     let solved = a.cholesky()?;
@@ -99,7 +99,7 @@ mod tests {
     const ERROR_M: f64 = 0.001;
     const PX_M: f64 = 43.5;
 
-    /// With nothing beside the drift.
+    /// Fits the drift without nuisance parameters.
     fn found(checked: &[ReferencedView]) -> Option<WarmUp> {
         let session_s = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
         warm_up(session_s, |moves| {
@@ -111,8 +111,8 @@ mod tests {
         })
     }
 
-    /// Sessions of an hour at most, by each course; what is told of the end of a drift that the
-    /// session did not see is to hold it: 90 % of 40 are 36, and 31 or fewer have a chance of 2 %.
+    /// Sessions of an hour at most, for each course. The intervals should hold the end of a drift that the
+    /// session did not see: 90 % of 40 are 36, and 31 or fewer have a chance of 2 %.
     #[test]
     fn intervals_hold_whatever_the_course() {
         for (number, course) in COURSES.iter().enumerate() {

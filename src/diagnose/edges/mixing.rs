@@ -1,4 +1,4 @@
-//! Does depth mix at the target's edge? One share a view; the views are the sample.
+//! Depth mixing at the target's edge: one share per view, with the views as the sample.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,21 +11,21 @@ use crate::diagnose::views::field::Field;
 use crate::stats::{bisect, common_value, mean};
 use crate::terms::{Axis, Statistic};
 
-/// Widths of the footprint that decide whether depth mixes, px.
+/// Footprint widths tried to decide whether depth mixes, px.
 const TRIED_PX: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
-/// And that tell how far, px.
+/// Widths tried to estimate how far, px.
 const WIDTHS_PX: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
-/// So few views show no rule.
+/// Too few views to show a rule.
 const TOO_FEW_VIEWS: f64 = 2.0;
-/// Wider footprints are told as this, px: the catalogue's limit.
+/// Widest footprint that is reported, px: the catalogue's limit.
 const WIDEST_PX: f64 = 32.0;
 
-/// What a view's target mixes in, as a share of a full footprint's, with the information on it.
+/// Share of a full footprint's mixing in one view, and the information on it.
 fn share(edges: &Edges, width: f64) -> Option<(f64, f64)> {
     let (mut normal, mut cross, mut score) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
     let (mut own, mut own_score) = (0.0, 0.0);
     for (n, s) in edges.inside.iter().enumerate() {
-        // A bias that is smooth over the pixels at the edge is none of the edge's.
+        // A bias that is smooth over these pixels is not due to the edge.
         let x = n as f64 / INSIDE_PX as f64 - 0.5;
         let smooth = Vector3::new(1.0, x, x * x);
         let seen = footprint(n, width);
@@ -42,25 +42,25 @@ fn share(edges: &Edges, width: f64) -> Option<(f64, f64)> {
     (value.is_finite() && sure > 0.0).then_some((value, sure))
 }
 
-/// Share of the other surface in pixel `n` of the target from the edge, for a square footprint that
-/// reaches `width` px to either side.
+/// Share of the other surface in pixel `n` of the target from the edge, for a square footprint that reaches
+/// `width` px to either side.
 fn footprint(n: usize, width: f64) -> f64 {
     0.5 * (1.0 - (n as f64 + 0.5) / width).max(0.0)
 }
 
-/// All that a full footprint of this width mixes in, px of the step.
+/// Total mixed in by a full footprint of this width, in px of the step.
 fn mixed_px(width: f64) -> f64 {
     (0..WIDEST_PX as usize).map(|n| footprint(n, width)).sum()
 }
 
-/// The full footprint that mixes in so much.
+/// Width of the full footprint that mixes in this much.
 fn width_px(mixed: f64) -> f64 {
     let [low, high] = bisect([0.5, WIDEST_PX], |width| mixed_px(width) < mixed);
     0.5 * (low + high)
 }
 
-/// The views' mean share of a footprint's own curve, of whatever width, and the curve's size at the
-/// edge in sigmas. No bias is fitted beside it: none is a quarter of the step.
+/// Mean over the views of a footprint's share, for any width, and its size at the edge in sigmas. No bias is
+/// fitted beside it, since none is a quarter of the step.
 pub fn whole_share(views: &[&Edges], width: f64) -> Option<(ViewMean, f64)> {
     let of = |edges: &&Edges| {
         let sums = || edges.inside.iter().enumerate().map(|(n, s)| (footprint(n, width), s));
@@ -73,14 +73,14 @@ pub fn whole_share(views: &[&Edges], width: f64) -> Option<(ViewMean, f64)> {
     Some((ViewMean::weighed(&seen)?, footprint(0, width) * step_sigmas(views)))
 }
 
-/// The step to what is behind in sigmas of the noise: the views' mean.
+/// Mean over the views of the step to what is behind, in sigmas of the noise.
 fn step_sigmas(views: &[&Edges]) -> f64 {
     let seen = views.iter().filter(|e| e.sigma_px > 0.0);
     mean(seen.map(|e| e.step_px / e.sigma_px)).unwrap_or(0.0)
 }
 
-/// The views' mean share at a width, beyond that of the twins where there are any, and how well it
-/// explains them: the root of twice its nats, by the noise alone, with its sign.
+/// Mean share over the views at a width, beyond the twins' where there are any. Also how well it explains the
+/// views by the noise alone: the signed root of twice the gain in nats.
 pub fn mean_share(
     views: &[&Edges],
     twins: Option<&[&Edges]>,
@@ -100,8 +100,8 @@ pub fn mean_share(
     Some((between_runs(&seen)?, alone.1))
 }
 
-/// Mean of (value, information), with the views' scatter where that is larger than the noise's; and how well it
-/// explains them.
+/// Mean of (value, information) with the views' scatter where that exceeds the noise, and how well it
+/// explains the views.
 fn by_noise(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
     let n = views.len() as f64;
     let sure: f64 = views.iter().map(|v| v.1).sum();
@@ -112,19 +112,19 @@ fn by_noise(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
     (n > 1.0 && sure > 0.0).then_some((ViewMean { value, std_error, views: n }, explained))
 }
 
-/// The same of differences between two runs, which differ view by view for no reason: with the scatter between
-/// views, so that no view decides alone because its noise is small.
+/// Same for differences between two runs, which differ from view to view without a cause: includes the
+/// scatter between views, so that no view with little noise decides alone.
 fn between_runs(views: &[(f64, f64)]) -> Option<ViewMean> {
     let units: Vec<(f64, f64)> = views.iter().map(|(v, sure)| (*v, 1.0 / sure)).collect();
     let [value, std_error] = common_value(&units)?;
     Some(ViewMean { value, std_error, views: views.len() as f64 })
 }
 
-/// A footprint's width, the views' mean share of it and how well it explains them.
+/// Width of a footprint, mean share of it, and how well it explains the views.
 type Footprint = (f64, (ViewMean, f64));
 
-/// The width that explains the views best; of those that do alike, as 1 and 1.5 px, which reach one pixel,
-/// the narrowest.
+/// Width that explains the views best. Of equally good ones, such as 1 and 1.5 px, which both reach one
+/// pixel, the narrowest.
 fn best(edges: &[&Edges], twins: Option<&[&Edges]>, widths: &[f64]) -> Option<Footprint> {
     let at = |w: &f64| Some((*w, mean_share(edges, twins, *w)?));
     let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > TOO_FEW_VIEWS);
@@ -132,7 +132,7 @@ fn best(edges: &[&Edges], twins: Option<&[&Edges]>, widths: &[f64]) -> Option<Fo
     seen.reduce(|a, b| if b.1.1 - a.1.1 > ROUNDING * a.1.1.abs() { b } else { a })
 }
 
-/// Views whose edges mix while the others' do not, among so many, and the chance of it.
+/// Views whose edges mix while the others' do not, the number of views measured, and the p-value.
 fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, usize, f64)> {
     let at = |width: &f64| {
         let sure = |e: &&'a Edges| share(e, *width).map(|(value, sure)| (*e, value * sure.sqrt()));
@@ -143,7 +143,7 @@ fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, usize, f64)>
     TRIED_PX.iter().filter_map(at).min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
-/// Depth mixed at the edge, where the views, or some of them, agree on it at this level.
+/// Finding of depth mixing at the edge, if all or some of the views show it at this level.
 pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<TextureFinding> {
     let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
@@ -153,7 +153,7 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<T
     if p <= level {
         return found(&edges, best(&edges, twins, &WIDTHS_PX)?, p);
     }
-    // The second test at this level.
+    // This is the second test at the level.
     let (some, of, p) = twins.is_none().then(|| mixing_views(&edges)).flatten()?;
     let p = 2.0 * tried * p;
     let footprint = (p <= level).then(|| best(&some, None, &WIDTHS_PX)).flatten()?;
@@ -164,7 +164,7 @@ fn found(edges: &[&Edges], (width, (share, _)): Footprint, p: f64) -> Option<Tex
     let full = mixed_px(width);
     let [mixed, error] = [full * share.value, full * share.std_error];
     let slope = (width_px(mixed + error) - width_px((mixed - error).max(0.0))) / 2.0;
-    // A part of a wider footprint mixes as much as the whole of a narrower one.
+    // Part of a wider footprint mixes in as much as the whole of a narrower one.
     let whole = width_px(mixed);
     let std_error = slope.hypot(width - whole);
     let edge = share.value * footprint(0, width);
@@ -186,8 +186,8 @@ fn found(edges: &[&Edges], (width, (share, _)): Footprint, p: f64) -> Option<Tex
 mod tests {
     use super::*;
 
-    /// Two runs differ view by view: one view of little noise is off by nine times its own, the others
-    /// by as much to either side.
+    /// Two runs differ view by view: one view with little noise is off by nine times its own error, the
+    /// others by as much to either side.
     #[test]
     fn one_view_of_little_noise_does_not_decide_alone() {
         let others = (0..9).map(|k| (0.03 * f64::from(k - 4) / 4.0, 1e4));

@@ -1,4 +1,4 @@
-//! Where the lines of a picture cross the target's edge, and what they show there.
+//! Finds where the lines of a picture cross the target's edge, and sums what they show there.
 
 use super::{Crossing, Edges, INSIDE_PX, MIN_INSIDE_PX};
 use crate::camera::Rays;
@@ -6,22 +6,22 @@ use crate::diagnose::views::field::Field;
 use crate::frame::{DepthTable, Frame};
 use crate::stats;
 
-/// The farthest from the region that what is behind is looked for, as a share of the picture's width:
-/// the shadow of a Kinect's target at 0.5 m before a far wall takes a seventh.
+/// Distance from the region within which the background is searched, as a share of the picture's width; the
+/// shadow of a Kinect's target at 0.5 m before a far wall takes a seventh.
 const FARTHEST: f64 = 0.25;
-/// Pixels in a row that must agree on what is behind.
+/// Consecutive pixels that must agree on the background.
 const BEHIND_PX: usize = 4;
-/// What is behind is lower than the plane by so many sigma in each of them: one in 10^11 by chance.
+/// Sigmas by which each of them must lie below the plane: one in 10^11 by chance.
 const BELOW_SIGMAS: f64 = 3.0;
-/// And the step is so many, so that a pixel half-way is three from either surface.
+/// Least step in sigmas: a pixel half-way is then three from either surface.
 const STEP_SIGMAS: f64 = 6.0;
-/// Beyond the shadow's end a matching window sees a part of it: half of a Kinect's nine pixels, of 640.
+/// Beyond the shadow's end a matching window still sees a part of it: half of a Kinect's nine pixels, of 640.
 const FRINGE: f64 = 4.5 / 640.0;
 /// Pixels beyond that, which show how much is lost anyway.
 const BEYOND_PX: usize = 8;
 
 impl Edges {
-    /// Where the lines cross the edge, by the view's first frame.
+    /// Finds where the lines cross the edge in the view's first frame.
     pub fn find(field: &Field, frame: &Frame, rays: &Rays, table: &DepthTable) -> Self {
         let scan = EdgeScan { field, frame, rays, table, on: field.on_target() };
         let mut edges = Edges::default();
@@ -31,7 +31,7 @@ impl Edges {
                 let noise = f64::from(field.sigma[k].max(field.spread_px));
                 let Some(crossing) = scan.crossing(i as isize, stride, noise) else { continue };
                 step -= crossing.step;
-                // As the residuals are scaled.
+                // Scaled like the residuals.
                 let own = scan.plane(crossing.last);
                 sigma += noise * (own + crossing.step) / own;
                 if let Some(side) = crossing.side {
@@ -49,8 +49,8 @@ impl Edges {
     /// Adds what a frame shows along the crossings.
     pub fn add(&mut self, field: &Field, frame: &Frame, rays: &Rays, table: &DepthTable) {
         self.frames += 1;
-        // The first frame chose which pixel is the last: one beside the target whose gross error lies
-        // nearer to it looks mixed there. Other frames are fair; without any, that pixel is left out.
+        // The first frame chose the last pixel: one beside the target whose gross error lies nearer to the
+        // target looks mixed there. Other frames are fair; without any, that pixel is left out.
         if self.frames == 2 {
             self.inside = Default::default();
         }
@@ -59,10 +59,10 @@ impl Edges {
         for c in &self.crossings {
             for (n, sums) in self.inside[..c.inside].iter_mut().enumerate().skip(fair) {
                 let i = c.last - n as isize * c.stride;
-                // Depth mixes, not disparity: the share of the step in depth, times the step in px.
+                // Depth mixes, not disparity: take the share of the step in depth, times the step in px.
                 let (own, seen) = (field.plane_at(i as usize, rays), field.scale_px_m / depth(i));
                 let residual = (seen - own) * (own + c.step) / seen;
-                // What is nearer to the other surface is not this one's.
+                // A reading nearer to the other surface does not belong to this one.
                 if residual.abs() < 0.5 * c.step.abs() {
                     sums.n += 1.0;
                     sums.residual += residual;
@@ -85,17 +85,17 @@ impl Edges {
     }
 }
 
-/// Disparity half-way in depth between two.
+/// Disparity half-way in depth between two disparities.
 fn half_way(a: f64, b: f64) -> f64 {
     2.0 * a * b / (a + b)
 }
 
-/// Pixels beside the edge that may lie in the shadow.
+/// Number of pixels beside the edge that may lie in the shadow.
 fn shadow_px(step: f64) -> usize {
     step.abs().ceil() as usize + 1
 }
 
-/// Pixels beyond a shadow that are neither in it nor beyond it.
+/// Number of pixels past a shadow that are neither in it nor clear of it.
 fn fringe_px(width: usize) -> usize {
     (FRINGE * width as f64).ceil() as usize
 }
@@ -110,8 +110,8 @@ struct EdgeScan<'a> {
 }
 
 impl EdgeScan<'_> {
-    /// The crossing outwards of region pixel `start`; `None` where the next pixel is in the region
-    /// too, nothing is seen behind, or the region is too narrow.
+    /// Returns the crossing outwards of region pixel `start`; `None` where the next pixel is in the region
+    /// too, no background is seen, or the region is too narrow.
     fn crossing(&self, start: isize, stride: isize, sigma: f64) -> Option<Crossing> {
         let at = |n: isize| self.pixel(start, stride, n);
         let off = |n: isize| at(n).filter(|&i| !self.on[i as usize]);
@@ -130,8 +130,7 @@ impl EdgeScan<'_> {
         let behind = walk.windows(BEHIND_PX).position(agree)?;
         let there: f64 = walk[behind..behind + BEHIND_PX].iter().map(|d| d.0).sum();
         let there = there / BEHIND_PX as f64;
-        // The last pixel nearer to the target than to what is behind; the region may reach into the
-        // shadow.
+        // Last pixel nearer to the target than to the background; the region may reach into the shadow.
         let nearer = |n: &isize| {
             let i = at(*n).filter(|i| disparity(*i) > half_way(there, self.plane(*i)));
             i.is_some()
@@ -158,7 +157,7 @@ impl EdgeScan<'_> {
         self.field.plane_at(i as usize, self.rays)
     }
 
-    /// The pixel `n` strides on, in the same row or column.
+    /// Pixel `n` strides from `start`, in the same row or column.
     fn pixel(&self, start: isize, stride: isize, n: isize) -> Option<isize> {
         let (width, i) = (self.field.width as isize, start + n * stride);
         let inside = (0..self.frame.raw.len() as isize).contains(&i);

@@ -1,4 +1,4 @@
-//! Pictures of a board before a wall, whose edge is sharp, mixed or shaded by a known amount.
+//! Pictures of a board before a wall, with an edge that is sharp, mixed or shaded by a known amount.
 
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
@@ -16,23 +16,23 @@ use crate::simulate::kinect_v1;
 
 const WALL_M: f64 = 2.4;
 const CODE: DepthCode = DepthCode::Metric { units_per_metre: 20_000.0, invalid: 0 };
-/// Of the disparity, px.
+/// Noise of the disparity, px.
 const NOISE_PX: f64 = 0.05;
-/// The board's place in a picture of 320 x 240 px.
+/// Columns and rows of the board in a picture of 320 x 240 px.
 const BOARD: [std::ops::Range<isize>; 2] = [80..240, 60..180];
-/// The region ends so many px before the board does.
+/// Distance of the region's end from the board's border, px.
 const REGION_PX: isize = 3;
-/// The board's border: twice 160 and twice 120, less the corners that no line of the region meets.
+/// Border of the board: twice 160 and twice 120, less the corners that no line of the region meets.
 const CROSSINGS: f64 = 2.0 * (154.0 + 114.0);
 
-/// Pixels from the board's border: 0 is its last, -1 the first beside it.
+/// Pixels inwards from the board's border: 0 is its last, -1 the first beside it.
 fn depth_in(u: isize, v: isize) -> isize {
     let inside =
         |x: isize, range: &std::ops::Range<isize>| (x - range.start).min(range.end - 1 - x);
     inside(u, &BOARD[0]).min(inside(v, &BOARD[1]))
 }
 
-/// What a pixel answers with: share of the wall's depth by its way into the board, or nothing.
+/// Share of the other surface's depth that a pixel mixes in, by its way into the board; or nothing.
 type Answer<'a> = &'a dyn Fn(isize, &mut Stream) -> Option<f64>;
 
 /// A board at `z`, seen in three frames.
@@ -58,7 +58,7 @@ fn field(camera: &Camera, z: f64, rng: &mut Stream, answer: Answer<'_>) -> Field
         let mut frame = Frame { width, height, raw: vec![0; width * height] };
         for i in 0..width * height {
             let (u, v) = place(i);
-            // Rows of the board alone have a shadow; it lies left of it.
+            // Only the board's rows have a shadow, left of the board.
             let inside = depth_in(u, v);
             let left = u < BOARD[0].start && BOARD[1].contains(&v);
             let asked = if inside < 0 && !left { inside.min(-1000) } else { inside };
@@ -79,7 +79,7 @@ fn field(camera: &Camera, z: f64, rng: &mut Stream, answer: Answer<'_>) -> Field
     field
 }
 
-/// Ten views from 1 to 1.5 m, by one answer.
+/// Ten views from 1 to 1.5 m, with the same answer.
 fn views(seed: u64, answer: Answer<'_>) -> Vec<Field> {
     let camera = kinect_v1(2).camera;
     let mut rng = Seed(seed).stream("edges");
@@ -111,9 +111,9 @@ fn without_anything_behind_there_is_no_edge() {
     assert!(same.iter().all(|f| f.edges.inside[0].n == 0.0), "the same plane goes on");
 }
 
-/// The last pixel takes a hundredth of the step: 0.1 px of 0.05 px noise over 5000 pixels. The
-/// footprint that mixes in as much is read off w / (w - 1/2) = 1 / (1 - 2/100); part of a footprint
-/// of 1 px does so, too, and is not excluded.
+/// The last pixel takes a hundredth of the step: 0.1 px at 0.05 px of noise over 5000 pixels. The footprint
+/// that mixes in as much follows from w / (w - 1/2) = 1 / (1 - 2/100). Part of a footprint of 1 px does so
+/// too and is not excluded.
 #[test]
 fn a_hundredth_of_the_step_is_seen_and_sized() {
     let mixed = |inside: isize, _: &mut Stream| Some(if inside == 0 { 0.01 } else { 0.0 });
@@ -138,13 +138,13 @@ fn a_full_footprint_is_given_its_width() {
     assert!((width - 4.0).abs() < 0.2, "{width}");
 }
 
-/// Of 40 sets of views, how many have a mixed edge at a level of 5 %.
+/// Number of 40 sets of views with a mixed edge at a level of 5 %.
 fn mixed_of_40(first_seed: u64, answer: Answer<'_>) -> usize {
     let mixed = |seed: &u64| mixing(&views(*seed, answer), None, 0.05).is_some();
     (first_seed..first_seed + 40).filter(mixed).count()
 }
 
-/// At a level of 5 % two of 40 sharp edges may be told; eight are one in a thousand.
+/// At a level of 5 % two of 40 sharp edges may be found mixed; eight are one in a thousand.
 #[test]
 fn sharp_edges_are_told_as_often_as_the_level_says() {
     let count = mixed_of_40(100, &|_, _| Some(0.0));
@@ -169,7 +169,7 @@ fn what_the_twin_has_too_is_no_news() {
     assert!(mixing(&real, Some(&twin), 1e-3).is_none());
 }
 
-/// A pixel beside the board goes without an answer once in 50 times.
+/// A pixel beside the board is lost once in 50 times.
 #[test]
 fn a_shadow_that_loses_one_reading_in_fifty_is_seen() {
     let camera = kinect_v1(2).camera;
@@ -219,7 +219,7 @@ fn a_band_is_a_shadow_when_it_is_on_one_side_and_as_wide_as_it_must_be() {
     assert!(band(&shadows(|e| [f64::from(e > 25.0), 0.0]), 1e-3).is_none(), "a stray pixel");
 }
 
-/// The last three of ten views lose what geometry has, on the right; single pixels on the left are lost in all.
+/// The last three of ten views lose on the right what the geometry predicts; one pixel each would be no shadow.
 #[test]
 fn a_shadow_of_some_views_is_told_with_how_many() {
     let last = |e: f64| if e > 21.0 { 0.9 * e } else { 0.0 };
@@ -232,8 +232,8 @@ fn a_shadow_of_some_views_is_told_with_how_many() {
     assert!(band(&shadows(|e| [0.0, lines(e)]), 1e-3).is_none(), "a line is what a border errs by");
 }
 
-/// Three views are enough for a shadow of several pixels, and not for what borders err by, nor for one object before
-/// the wall.
+/// Three views are enough for a shadow of several pixels, but not for the border error, nor for one object
+/// before the wall.
 #[test]
 fn a_shadow_of_three_views_is_seen() {
     let of_three = |width: &dyn Fn(f64) -> f64| {

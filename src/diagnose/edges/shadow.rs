@@ -1,7 +1,7 @@
-//! Is there a shadow beside the target, in all views on one side, and as wide as it must be?
+//! Occlusion shadow: losses beside the target, in all views on one side, and as wide as predicted.
 //!
-//! The band that the projector cannot light is as many pixels wide as the disparity falls from the
-//! target's edge to what is behind: fx b (1/z - 1/z_behind), on the side away from the projector.
+//! The band that the projector cannot light is as many pixels wide as the disparity drops from the target's
+//! edge to the background: fx b (1/z - 1/z_behind), on the side away from the projector.
 
 use super::{EdgeLoss, Edges};
 use crate::diagnose::checks::replication::agree;
@@ -16,35 +16,34 @@ use crate::stats::student_upper;
 pub struct Band {
     /// 0 left of the target, 1 right of it.
     pub side: usize,
-    /// As wide as the geometry has it, and on one side.
+    /// Whether it is as wide as the geometry predicts, and on one side.
     pub lawful: bool,
-    /// Of what the geometry has, and its standard error.
+    /// Share of the predicted width that is lost, and its standard error.
     pub share: [f64; 2],
-    /// Nats of a share of the geometry's width, and of one width everywhere.
+    /// Nats of a share of the predicted width, and of one width everywhere.
     pub gain: [f64; 2],
     pub p: f64,
     pub curve: Curve,
-    /// So many of so many views have it, where not all do.
+    /// Views that have it, of how many, where not all do.
     pub of_some: Option<[usize; 2]>,
 }
 
 const MIN_VIEWS: usize = 3;
-/// The other side has less than this share of it.
+/// The other side must have less than this share of it.
 const OTHER_SIDE: f64 = 0.4;
-/// A shadow is no wider than this share of what geometry has: pixels that see both surfaces are
-/// lost beside it.
+/// Widest shadow, as a share of the predicted width: pixels that see both surfaces are lost beside it.
 const WIDEST: f64 = 1.4;
-/// One view's border is known to this, px: its rows err alike.
+/// Standard error of one view's border, px; its rows err together.
 const BORDER_PX: f64 = 0.7;
-/// A name must explain this share of what the best curve does.
+/// Share of the best curve's gain that a name must reach.
 const SHADOW_ADEQUATE: f64 = 0.6;
 
-/// What a view has left and right of the target; `None` where too little is seen.
+/// Losses of a view left and right of the target; `None` where too little is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides(pub [Option<EdgeLoss>; 2]);
 
 impl Sides {
-    /// What is lost beyond what a twin loses, where there is one.
+    /// Losses beyond those of a twin, where there is one.
     pub fn of(edges: &Edges, twin: Option<&Edges>) -> Self {
         let side = |side: usize| {
             let own = edges.beside(side)?;
@@ -56,12 +55,12 @@ impl Sides {
     }
 }
 
-/// What is lost as a share of `of`, view by view.
+/// Mean over the views of the losses as a share of `of`.
 fn law(views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> Option<ViewMean> {
     ViewMean::weighed(&views.iter().map(|v| (v.lost / of(v), of(v))).collect::<Vec<_>>())
 }
 
-/// What either side has in the views that see it, and the share of the geometry's width that is lost.
+/// Per side, the views that see it, and the share of the predicted width that is lost.
 fn by_side(views: &[Sides]) -> [(Vec<EdgeLoss>, Option<ViewMean>); 2] {
     [0, 1].map(|side: usize| {
         let seen: Vec<EdgeLoss> = views.iter().filter_map(|s| s.0[side]).collect();
@@ -71,7 +70,7 @@ fn by_side(views: &[Sides]) -> [(Vec<EdgeLoss>, Option<ViewMean>); 2] {
     })
 }
 
-/// Of the side that loses more.
+/// Share on the side that loses more.
 pub fn largest_share(views: &[Sides]) -> Option<ViewMean> {
     let [(_, left), (_, right)] = by_side(views);
     [left?, right?].into_iter().max_by(|a, b| a.value.total_cmp(&b.value))
@@ -82,7 +81,7 @@ fn t(share: &ViewMean) -> f64 {
     if share.value > 0.0 { share.value / share.std_error.max(1e-9 * share.value) } else { 0.0 }
 }
 
-/// What a share of `of` is worth: that the views agree on it, and whole pixels that it explains.
+/// Nats of a share of `of`: for the agreement of the views on it, and for the whole pixels it explains.
 fn nats(share: &ViewMean, views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> f64 {
     let square = |px: f64, v: &EdgeLoss| (px / v.rows / BORDER_PX).powi(2);
     let explained = |v: &EdgeLoss| square(v.lost, v) - square(v.lost - share.value * of(v), v);
@@ -90,7 +89,7 @@ fn nats(share: &ViewMean, views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> 
         + 0.5 * views.iter().map(explained).sum::<f64>()
 }
 
-/// The band that the views agree on, or some of them, if there is one at this level.
+/// Band of losses that all of the views, or some of them, show at this level.
 pub fn band(views: &[Sides], level: f64) -> Option<Band> {
     let all = band_of(views)?;
     if all.p <= level {
@@ -100,7 +99,7 @@ pub fn band(views: &[Sides], level: f64) -> Option<Band> {
     sides.min_by(|a, b| a.p.total_cmp(&b.p)).filter(|b| b.p <= level)
 }
 
-/// The band of those views that lose more on this side than a border errs by.
+/// Band of those views that lose more on this side than the border error.
 fn shaded_views(views: &[Sides], side: usize) -> Option<Band> {
     let seen: Vec<(Sides, EdgeLoss)> =
         views.iter().filter_map(|s| Some((*s, s.0[side]?))).collect();
@@ -113,10 +112,10 @@ fn shaded_views(views: &[Sides], side: usize) -> Option<Band> {
     Some(Band { p, of_some, ..band_on(&shaded, side)? })
 }
 
-/// Degrees of freedom of what is no estimate of these views: with so many Student's t is normal.
+/// Degrees of freedom of a constant, which these views do not estimate: Student's t is then normal.
 const OF_A_CONSTANT: usize = 1000;
 
-/// What the views agree on, whatever the chance of it, on the side that loses more.
+/// Band on the side that loses more, whatever its significance.
 fn band_of(views: &[Sides]) -> Option<Band> {
     let [left, right] = by_side(views).map(|(_, share)| share.map_or(0.0, |share| share.value));
     band_on(views, usize::from(right > left))
@@ -127,7 +126,7 @@ fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
     let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
-    // Two sides were looked at, and by the borders is the second test at this level.
+    // Two sides were tried, and the border error is the second test at this level.
     let p = (2.0 * lawful.p_above(0.0).min(2.0 * beyond_borders(views))).min(1.0);
     let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
     let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
@@ -142,8 +141,8 @@ fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     })
 }
 
-/// Chance of widths that go with the geometry's as these do. Of few views the scatter tells little: what a border errs
-/// by counts beside it, as much as the fewest views do.
+/// P-value of the widths' dependence on the predicted ones. Few views say little about their scatter, so the
+/// border error is pooled with it, with the weight of the fewest views.
 fn beyond_borders(views: &[EdgeLoss]) -> f64 {
     let products = views.iter().map(|v| [v.lost, v.shaded].map(|px| px / v.rows));
     let (own, cross, square) =
@@ -176,7 +175,7 @@ fn curve(views: &[EdgeLoss], share: f64) -> Curve {
     }
 }
 
-/// Do the shadows of both halves have the same share of the expected width?
+/// Whether the shadows of both halves have the same share of the predicted width.
 pub fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
     let half = |which: bool| {
         let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);

@@ -56,7 +56,7 @@ impl Along {
         Along { label, value }
     }
 
-    /// Where nine tenths of the term's energy lie.
+    /// Interval that holds the middle nine tenths of the term's energy.
     pub fn interval(&self, scene: &Scene<'_>, values: &[Vec<f64>]) -> [f64; 2] {
         let mut energy: Vec<(f64, f64)> = Vec::new();
         for (view, values) in scene.data.iter().zip(values) {
@@ -80,7 +80,7 @@ impl Along {
         [at(0.05), at(0.95)]
     }
 
-    /// Binned: as measured without the other terms, and as fitted.
+    /// Binned curve: as measured without the other terms, and as fitted.
     pub fn curve(&self, scene: &Scene<'_>, left: &[Vec<f64>], mine: &[Vec<f64>]) -> Curve {
         const BINS: usize = 32;
         let [low, high] =

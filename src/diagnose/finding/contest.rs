@@ -1,11 +1,11 @@
-//! Names in doubt, and what a view more would make of them.
+//! Names in doubt, and the chance that one more view settles them.
 //!
-//! The view is drawn as the search will see it, by its normal equations A: one of the causes in
-//! doubt, with coefficients as probable as the views taken make them, gives it the scores A beta and
-//! noise as wide as these views scatter. Then all names are weighed anew. The share of draws after
-//! which the true name is sure is the chance that the view settles it (a preposterior analysis:
-//! Raiffa and Schlaifer 1961). A cause that should be farther ahead of a rival on the views taken
-//! than it is, is not alone there or not of its formula: it settles nothing.
+//! The view is simulated as the search will see it, by its normal equations A. One of the causes in
+//! doubt is drawn, with coefficients from their posterior; the scores are A beta plus noise with the
+//! dispersion of the views taken. Then all names are weighed again. The share of draws in which the true
+//! name becomes sure is the chance that the view settles it (preposterior analysis: Raiffa and Schlaifer
+//! 1961). A cause whose lead over a rival on the views taken is too small is not the only one there, or
+//! does not follow its formula: it settles nothing.
 
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
@@ -30,7 +30,7 @@ use crate::terms::{Basis, Statistic, Term};
 pub const SURE: f64 = 0.9;
 /// Draws of a view: a chance of one half has a standard error of .03.
 const DRAWS: usize = 250;
-/// Standard errors that a cause may be less ahead of a rival than it should be.
+/// Standard errors by which a cause's lead over a rival may fall short of the expected one.
 const SHORT: f64 = 2.0;
 
 /// The names in doubt, on the views taken.
@@ -38,18 +38,18 @@ pub struct Contest<'a> {
     chosen: &'a Chosen,
     /// The most probable first.
     pub names: Vec<Name<'a>>,
-    /// What is fitted beside every name, and the names'.
+    /// Basis functions fitted with every name, then those of the names.
     pub bases: Vec<&'a Basis>,
-    /// Of the views taken, on the columns of all these; those beside the names come first.
+    /// Information of the views taken, on the columns of `bases`.
     pub information: DMatrix<f64>,
     beside: Vec<usize>,
-    /// The views taken, on what is beside alone.
+    /// The views taken, on the columns `beside` only.
     base: Vec<Evidence>,
     prior: f64,
-    /// How probable each name is on the views taken, and that it is none of them, when weighed here:
-    /// on coarser samples than the search's and beside what it found.
+    /// Probability of each name on the views taken, and of none of them, as weighed here: on coarser samples
+    /// than the search's and given what it found.
     pub now: Vec<f64>,
-    /// Is each name as far ahead of every rival as it should be?
+    /// Whether each name leads every rival by as much as it should.
     borne_out: Vec<bool>,
 }
 
@@ -57,28 +57,28 @@ pub struct Name<'a> {
     pub family: &'static str,
     basis: &'a Basis,
     probability: f64,
-    /// Those beside it first.
+    /// Columns beside it, then its own.
     columns: Vec<usize>,
-    /// The views taken, on these.
+    /// The views taken, on these columns.
     views: Vec<Evidence>,
     fit: Gain,
-    /// Of its coefficients' covariance, as the views scatter.
+    /// Root of its coefficients' covariance, with the dispersion of the views.
     root: DMatrix<f64>,
-    /// Variance of the views about it, over their noise's.
+    /// Dispersion of the views about its fit.
     scatter: f64,
-    /// Share that its formula is off by.
+    /// Relative error of its formula.
     formula_error: f64,
 }
 
-/// On these columns alone.
+/// Evidence on these columns only.
 fn part(e: &Evidence, columns: &[usize]) -> Evidence {
     let a = e.a.select_rows(columns).select_columns(columns);
     Evidence { a, b: e.b.select_rows(columns) }
 }
 
 impl<'a> Contest<'a> {
-    /// Between the names `stated` of a finding that began with `chosen`; all other terms are taken
-    /// out of `data` as they were fitted.
+    /// Contest between the names `stated` of a finding that began with `chosen`. All other terms, except a
+    /// refit of sigma, are subtracted from `data` as fitted. `None` with fewer than two names.
     pub fn of(
         (statistic, data): (Statistic, &[ViewData]),
         outcome: &'a Outcome,
@@ -149,10 +149,10 @@ impl<'a> Contest<'a> {
         (contest.names.len() > 1).then_some(contest)
     }
 
-    /// Is it ahead of the rivals as it should be if it were true?
+    /// Whether name `k` leads every rival by as much as it should if it were true.
     fn is_borne_out(&self, k: usize, gains: &[(Gain, f64)]) -> bool {
         (0..self.names.len()).filter(|&r| r != k).all(|r| {
-            // The variance of the gain is twice what is expected, times the views' scatter.
+            // The variance of the gain is twice its expectation, times the dispersion of the views.
             let apart = self.apart(&self.information, &self.names[k], &self.names[r]);
             let error = (apart * self.names[k].scatter).sqrt();
             let slack = as_good(gains[k].0.total);
@@ -160,21 +160,21 @@ impl<'a> Contest<'a> {
         })
     }
 
-    /// Standard errors between a cause as it was fitted and the best that a rival can do, in square.
+    /// Squared standard errors between a cause as fitted and the best fit of a rival to it.
     fn apart(&self, a: &DMatrix<f64>, truth: &Name<'_>, rival: &Name<'_>) -> f64 {
         let own = &truth.columns[self.beside.len()..];
         let beta = truth.fit.beta.rows(self.beside.len(), own.len()).into_owned();
         let of = |rows: &[usize], columns: &[usize]| a.select_rows(rows).select_columns(columns);
         let cross = of(&rival.columns, own) * &beta;
         let mut free = of(&rival.columns, &rival.columns);
-        // Columns that say nothing must not divide by nothing.
+        // Keeps columns without information from making the matrix singular.
         let floor = 1e-9 * free.diagonal().max().max(f64::MIN_POSITIVE);
         free.set_diagonal(&free.diagonal().add_scalar(floor));
         let absorbed = free.cholesky().map_or(0.0, |c| cross.dot(&c.solve(&cross)));
         (beta.dot(&(of(own, own) * &beta)) - absorbed).max(0.0)
     }
 
-    /// Sum of that over all pairs, each by the chance that the one is true and that it is the other.
+    /// Sum of these over all pairs, weighted by the probabilities of both names.
     pub fn all_apart(&self, a: &DMatrix<f64>) -> f64 {
         let pairs = self.names.iter().flat_map(|n| self.names.iter().map(move |m| (n, m)));
         pairs
@@ -185,7 +185,7 @@ impl<'a> Contest<'a> {
             .sum()
     }
 
-    /// What each name brings on the views taken and one more: as it is, and corrected for their scatter.
+    /// Gain of each name on the views taken and one more, as it is and corrected for their dispersion.
     fn gains(&self, more: Option<&Evidence>) -> Option<Vec<(Gain, f64)>> {
         let gain_of = |taken: &[Evidence], columns: &[usize]| {
             let more = more.map(|e| part(e, columns));
@@ -201,7 +201,7 @@ impl<'a> Contest<'a> {
         self.names.iter().map(over_base).collect()
     }
 
-    /// How probable such gains make each name, and that it is none of them.
+    /// Probability of each name given these gains, and of none of them.
     fn weigh(&self, gains: &[(Gain, f64)]) -> Option<Vec<f64>> {
         let best = gains.iter().map(|g| g.1).fold(f64::NEG_INFINITY, f64::max);
         if best <= 0.0 {
@@ -222,7 +222,7 @@ impl<'a> Contest<'a> {
         let (_, _, mut stated) = naming(&Chosen {
             candidate: Candidate::named(leader.family, leader.basis.clone()),
             gain,
-            // What no name explains grows with what one does.
+            // The gain of a nameless curve grows in proportion.
             best_curve: self.chosen.best_curve / self.chosen.gain * gain.max(0.0),
             rivals: self.names.iter().zip(gains).map(rival).collect(),
             ..self.chosen.clone()
@@ -237,7 +237,7 @@ impl<'a> Contest<'a> {
         Some(all)
     }
 
-    /// The number of the name that is sure with a view more: the odds stated times what it changes.
+    /// Index of the name that one more view makes sure: the stated odds times the change by the view.
     pub fn sure_with(&self, more: &Evidence) -> Option<usize> {
         let none = 1.0 - self.names.iter().map(|n| n.probability).sum::<f64>();
         let stated = self.names.iter().map(|n| n.probability).chain([none]);
@@ -248,7 +248,7 @@ impl<'a> Contest<'a> {
         (0..self.names.len()).find(|&k| then[k] >= SURE * total)
     }
 
-    /// The chance that a view with these normal equations makes the true name sure.
+    /// Chance that a view with the information `a` makes the true name sure.
     pub fn chance(&self, a: &DMatrix<f64>, mut rng: Stream) -> f64 {
         let noise = root(a);
         let settled = (0..DRAWS).filter(|_| self.settles(a, &noise, &mut rng)).count();
@@ -261,7 +261,7 @@ impl<'a> Contest<'a> {
             left -= name.probability;
             left < 0.0
         });
-        // None of them: no view makes it one.
+        // None of the names is true: no view settles it.
         let Some(drawn) = drawn else { return false };
         if !self.borne_out[drawn] {
             return false;
@@ -269,7 +269,7 @@ impl<'a> Contest<'a> {
         let truth = &self.names[drawn];
         let mut white = |n: usize| DVector::from_fn(n, |_, _| StandardNormal.sample(rng));
         let mut beta = &truth.fit.beta + &truth.root * white(truth.columns.len());
-        // By what its formula is off, it is larger or smaller in another view.
+        // The error of its formula makes it larger or smaller in another view.
         let off = 1.0 + truth.formula_error * white(1)[0];
         beta.rows_mut(self.beside.len(), truth.basis.count()).scale_mut(off);
         let scores = a.select_columns(&truth.columns) * beta;
@@ -277,7 +277,7 @@ impl<'a> Contest<'a> {
         self.sure_with(&Evidence { a: a.clone(), b }) == Some(drawn)
     }
 
-    /// Standard errors between the two best names, by views of this information.
+    /// Standard errors between the two best names, for views with this information.
     pub fn separation(&self, information: &DMatrix<f64>) -> f64 {
         self.apart(information, &self.names[0], &self.names[1]).sqrt()
     }

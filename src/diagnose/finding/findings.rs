@@ -1,4 +1,4 @@
-//! From what the searches chose to what is told.
+//! Turns the terms that the searches chose into findings.
 
 use rayon::prelude::*;
 use serde_json::Map;
@@ -17,15 +17,15 @@ use crate::effects::Fitted;
 use crate::model::Covariance;
 use crate::terms::{Axis, Basis, Modulation, Term};
 
-/// All terms of a layer as findings. Terms of one family are one finding, and a nameless curve on
-/// the axis of a name is that name's shape, met better.
+/// Returns all terms of a layer as findings. Terms of one family form one finding; a nameless curve on the
+/// axis of a name refines that name's shape.
 pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
     let terms = terms_of(outcome, scene.statistic);
-    // Groups: who goes with whom.
+    // Terms that form one finding.
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (k, c) in outcome.chosen.iter().enumerate() {
         let axis = c.candidate.basis.axis();
-        // What planes absorb of a term goes with it.
+        // The part of a term that planes absorb goes with it.
         if let (Basis::Affine { .. }, Some(home)) =
             (&c.candidate.basis, groups.iter_mut().find(|g| g.contains(&k.wrapping_sub(1))))
         {
@@ -36,12 +36,12 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
         let home = groups.iter().position(|g| {
             let first = &outcome.chosen[g[0]];
             match c.candidate.family {
-                // The smooth rest of a radial cause.
+                // The smooth remainder of a radial cause.
                 None if is_map && first.candidate.family.is_some() => {
                     first.candidate.basis.axis() == Axis::Radius
                 }
                 Some(family) => {
-                    // A curve came first, but this name had explained half of it.
+                    // A curve came first, but this name had explained enough of it.
                     let nearly = first.candidate.family.is_none()
                         && first.candidate.basis.axis() == axis
                         && first
@@ -50,7 +50,7 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
                             .any(|r| r.family == family && r.gain > NEARLY * first.gain);
                     first.candidate.family == c.candidate.family || nearly
                 }
-                // Smooth curves over the picture share what they show.
+                // Smooth curves over the picture overlap.
                 None => {
                     let smooth = |c: &Chosen| is_smooth_and_nameless(&c.candidate);
                     first.candidate.basis.axis() == axis || smooth(c) && smooth(first)
@@ -63,7 +63,7 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
             None => groups.push(vec![k]),
         }
     }
-    // What each half of the views has otherwise, and no physics has a name for, is their scatter.
+    // A nameless shape that differs between the halves of the views is scatter.
     let scattered = |group: &Vec<usize>| {
         let nameless = group.iter().all(|&k| outcome.chosen[k].candidate.family.is_none());
         nameless && outcome.halves.as_ref().is_some_and(|h| h.contradict(group))
@@ -72,7 +72,7 @@ pub fn findings(scene: &Scene<'_>, outcome: &Outcome) -> Vec<Finding> {
     told.map(|group| finding(scene, outcome, group, &terms)).collect()
 }
 
-/// A name found after a curve on its axis stands for both if it had explained this share of it.
+/// A name found after a curve on its axis stands for both if it had explained this share of the curve.
 const NEARLY: f64 = 0.4;
 
 fn finding(scene: &Scene<'_>, outcome: &Outcome, group: &[usize], terms: &[Term]) -> Finding {
@@ -104,7 +104,7 @@ fn finding(scene: &Scene<'_>, outcome: &Outcome, group: &[usize], terms: &[Term]
         effect,
         alternatives,
         interval: along.interval(scene, &mine),
-        // Nats for now; the engine turns them into shares.
+        // Nats for now; `verdict::shares` turns them into shares.
         share: group.iter().map(|&k| outcome.chosen[k].gain).sum(),
         parameters,
         size: size(scene, &mine),
@@ -122,7 +122,7 @@ fn finding(scene: &Scene<'_>, outcome: &Outcome, group: &[usize], terms: &[Term]
     }
 }
 
-/// Of the terms of a group.
+/// Covariance of the terms of a group.
 fn covariance_of(outcome: &Outcome, group: &[usize]) -> Covariance {
     let Covariance { fit, factors, variances } = &outcome.covariance;
     let of = |f: &Vec<f64>| -> Vec<f64> {
@@ -131,7 +131,7 @@ fn covariance_of(outcome: &Outcome, group: &[usize]) -> Covariance {
     Covariance { fit: *fit, factors: factors.iter().map(of).collect(), variances: of(variances) }
 }
 
-/// With how large it is and where, in these views; of a finding that is one term.
+/// Fills in the size and the interval, in these views, of a finding with one term.
 pub fn placed(finding: Finding, scene: &Scene<'_>) -> Finding {
     let Some(term) = finding.terms.first() else { return finding };
     let values = scene.values(std::slice::from_ref(term));
@@ -139,7 +139,7 @@ pub fn placed(finding: Finding, scene: &Scene<'_>) -> Finding {
     Finding { interval, size: size(scene, &values), ..finding }
 }
 
-/// Every nameless curve that saw something, on the data as they came.
+/// Nameless curves significant at `level` before anything is explained: the largest of each axis.
 pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
     let of_axis = |basis: &Basis| match basis {
         // A ripple's period is not the axis's own curve.

@@ -1,17 +1,17 @@
-//! Which form of sigma(z, theta) the measured noise follows: told where the model's own does not.
+//! Finds which form of sigma(z, theta) the measured noise follows where the model's own does not fit.
 
 use crate::diagnose::views::layers::Survey;
 use crate::measure::{SigmaRow, SigmaTable};
 use crate::model::{Direction, Form, HeldOut, SigmaModel, compare_forms};
 
-/// Bins of depth over a view: a tilted one spans some.
+/// Depth bins per view; a tilted view spans several.
 const BINS: usize = 3;
-/// Mean squared error in a form's own predicted variance from where on it is no match either: twice
-/// the standard error it is sure of.
+/// Mean squared error, in units of a form's own predicted variance, beyond which the form is no match
+/// either: twice its predicted standard error.
 const NO_MATCH: f64 = 4.0;
 
-/// The form that predicts the noise of left-out distances best, in words; `None` where that is the
-/// model's own, or where the views are too few to judge.
+/// Name of the form that best predicts the noise of left-out distances; `None` where that is the model's
+/// own, or where the views are too few to judge.
 pub fn better_form(survey: &Survey, model: &SigmaModel, scale_px_m: f64) -> Option<String> {
     let axial = table(survey, scale_px_m);
     let across = SigmaTable { rows: axial.rows.iter().map(|r| across_plane(*r)).collect() };
@@ -61,13 +61,13 @@ fn table(survey: &Survey, scale_px_m: f64) -> SigmaTable {
                 bin.iter().map(|&i| data.weight[i] * of(i)).sum::<f64>() / weight
             };
             let z_m = mean(&|i| data.places[i].z);
-            // In units of z^2, which is what changes most over a bin.
+            // In units of z^2, which changes most over a bin.
             let log = mean(&|i| 0.5 * (data.response[i] + data.places[i].variance.ln()));
             rows.push(SigmaRow {
                 z_m,
                 theta_rad: data.places[bin[0]].theta,
                 sigma_m: log.exp() * z_m * z_m / scale_px_m,
-                // A logarithm's variance is 1 / weight, of a variance of n samples 2 / n.
+                // The variance of the log is 1 / weight; for a variance of n samples it is 2 / n.
                 n_effective: Some(2.0 * weight),
                 view,
             });

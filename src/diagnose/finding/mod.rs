@@ -1,4 +1,4 @@
-//! From terms and statistics to findings: names, numbers, curves and words.
+//! Turns terms and statistics into findings: names, numbers, curves and text.
 
 pub mod along;
 pub mod contest;

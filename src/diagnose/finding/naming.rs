@@ -1,4 +1,4 @@
-//! Which names a chosen term may have, and what is said of the physics behind one.
+//! The names a chosen term may have, and the text on the physics behind a name.
 
 use crate::diagnose::diagnosis::{Alternative, Finding, Status};
 use crate::diagnose::search::candidate::RECALIBRATE;
@@ -6,27 +6,26 @@ use crate::diagnose::search::outcome::Chosen;
 use crate::effects;
 use crate::terms::{Axis, Statistic};
 
-/// Logarithm of the odds of a family that needs so many columns more to say the same: it could have bent
-/// in each of these to what it is not, as far as all that is there (a unit-information prior; Kass and
-/// Wasserman 1995), and `gain` nats were seen to say that it did not.
+/// Log odds (Occam factor) of a family that needs so many more columns for the same fit, under a
+/// unit-information prior (Kass and Wasserman 1995) and after a gain of `gain` nats.
 pub fn ln_occam(more_columns: f64, gain: f64) -> f64 {
     -0.5 * more_columns * (1.0 + 2.0 * gain.max(0.0)).ln()
 }
 
-/// Logarithm of the odds for so many nats more. How far single views are ahead counts beside it.
+/// Log odds for a lead of so many nats. The lead in single views counts separately.
 pub fn ln_odds(nats: f64) -> f64 {
     0.25 * nats
 }
 
-/// Less probable names are not told.
+/// Names less probable than this are not reported.
 pub const MIN_PROBABILITY: f64 = 0.005;
 
-/// What a finding states as the odds of its names is this power of what the layers make of them:
-/// these count a name's own formula as right and the views as alike. By maximum likelihood on 246 best
-/// names of the development seeds 501, 777 and 902: 1.32, from 1.07 to 1.65 (95 %).
+/// Temperature of the stated odds: the layers' own odds to the power 1 / `TEMPERATURE`, because the layers
+/// take a name's formula as exact and the views as alike. By maximum likelihood on 246 best names of the
+/// development seeds 501, 777 and 902: 1.32, from 1.07 to 1.65 (95 %).
 const TEMPERATURE: f64 = 1.3;
 
-/// The names of a finding, and that it is none of them, with their odds tempered.
+/// Tempers the odds of a finding's names and of none of them.
 pub fn temper(alternatives: &mut [Alternative]) {
     let cool = |p: f64| p.max(0.0).powf(1.0 / TEMPERATURE);
     let stated = || alternatives.iter().filter_map(|a| a.probability);
@@ -37,15 +36,14 @@ pub fn temper(alternatives: &mut [Alternative]) {
     }
 }
 
-/// What is left of an error over the picture without a name may be the rest of the named part's own
-/// shape, which is then not what its name says: its names are the less probable the more is left, in
-/// shares of both.
+/// Lowers the probability of names of errors over the picture by the share of the nameless remainder. That
+/// remainder may belong to the shape of the named part, which is then not what its name says.
 pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
     let of_picture = |f: &Finding| {
         let places = [Axis::Column, Axis::Row, Axis::Radius, Axis::Pixel];
         f.statistic == Statistic::Bias && places.contains(&f.axis)
     };
-    // A fine pattern is no rest of a smooth shape.
+    // A fine pattern is not the remainder of a smooth shape.
     let smooth = |f: &&Finding| f.axis != Axis::Pixel || !f.terms.is_empty();
     let nameless = |f: &&Finding| of_picture(f) && f.status == Status::Unexplained && smooth(f);
     let left: f64 = found.iter().filter(nameless).map(|f| f.share).sum();
@@ -55,21 +53,22 @@ pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
     }
 }
 
-/// What was found, without the name it had.
+/// Removes the name of a finding.
 pub fn unname(f: &mut Finding) {
     (f.status, f.effect) = (Status::Unexplained, None);
     f.parameters.clear();
     f.physics = physics(f.status, None, f.statistic, f.axis, None);
 }
 
-/// Last of all: how sure its names are, whether it has one, and whether the extended model has it.
+/// Last step: tempers the probabilities, drops an improbable name, and tells whether the extended model has
+/// the finding.
 pub fn finish(f: &mut Finding) {
     temper(&mut f.alternatives);
     resembles_only(f);
     tell_if_held(f);
 }
 
-/// Says of what has no name, and of what some views have alone, whether the extended model has it.
+/// Tells whether the extended model has a finding that has no name or that only some views have.
 fn tell_if_held(f: &mut Finding) {
     let nameless = f.status == Status::Unexplained && f.contradicted.is_none();
     if nameless && !f.terms.is_empty() {
@@ -79,8 +78,7 @@ fn tell_if_held(f: &mut Finding) {
     }
 }
 
-/// A name that is less probable than that the cause has none of those told is no name: what was found is
-/// told as what it resembles.
+/// Removes a name that is less probable than none of the names; the finding then only resembles it.
 fn resembles_only(f: &mut Finding) {
     let stated: Option<Vec<f64>> = f.alternatives.iter().map(|a| a.probability).collect();
     let own =
@@ -94,8 +92,8 @@ fn resembles_only(f: &mut Finding) {
     }
 }
 
-/// Chance that the cause has none of the names, where a name gains `named` nats, the best nameless
-/// curve `curve`, and this share of it is `adequate`.
+/// Probability that the cause has none of the names, where a name gains `named` nats and the best nameless
+/// curve `curve`, of which the share `adequate` suffices.
 pub fn none_of_these(named: f64, curve: f64, adequate: f64) -> f64 {
     if curve <= 0.0 {
         return 0.0;
@@ -103,7 +101,7 @@ pub fn none_of_these(named: f64, curve: f64, adequate: f64) -> f64 {
     1.0 / (1.0 + ((named / curve.max(1e-9) - adequate - 0.06) / 0.05).exp())
 }
 
-/// Which names, and how sure.
+/// Status, name, and the possible names with their probabilities.
 pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative>) {
     let Some(family) = chosen.candidate.family else {
         return (Status::Unexplained, None, Vec::new());
@@ -136,7 +134,7 @@ pub fn naming(chosen: &Chosen) -> (Status, Option<&'static str>, Vec<Alternative
     (status, Some(family), alternatives)
 }
 
-/// What was left out, why it looks so, what else it could be.
+/// Text on what was left out, how it shows, and what it could be taken for.
 pub fn physics(
     status: Status,
     effect: Option<&'static str>,
@@ -173,8 +171,8 @@ mod tests {
     use crate::diagnose::finding::other_findings::{named, nameless};
     use crate::terms::{Basis, Term};
 
-    /// Half of what is there without a name: half as probable. What is left on another axis, or of
-    /// another statistic, takes nothing.
+    /// With half of the error nameless, the name is half as probable. A remainder on another axis, or of
+    /// another statistic, has no effect.
     #[test]
     fn a_name_is_doubted_by_what_is_left_over_the_picture_beside_it() {
         let with = |share: f64, statistic: Statistic, axis: Axis| Finding {
@@ -218,7 +216,7 @@ mod tests {
         assert_eq!(untested.effect, Some("vignetting"), "no test has weighed it");
     }
 
-    /// Twelve nats are 25 = 5^2 times as much information as the unit that is believed at first.
+    /// Twelve nats are 25 = 5^2 times the information of the prior.
     #[test]
     fn each_column_more_costs_the_root_of_what_was_seen() {
         assert_eq!(
@@ -249,7 +247,8 @@ mod tests {
         assert_eq!(untold[0].probability, None);
     }
 
-    /// The extended model holds the curve of one, none of what some views have, and still has what views contradict.
+    /// The extended model holds a measured curve, nothing of what only some views have, and still has an
+    /// effect that the views contradict.
     #[test]
     fn whether_the_extended_model_has_it_is_told() {
         let told = |change: &dyn Fn(&mut Finding)| {

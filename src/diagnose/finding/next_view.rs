@@ -1,5 +1,5 @@
-//! Which view would settle a name that these views leave in doubt: of those at which the causes are
-//! farthest apart, the one that is most likely to.
+//! Finds the view most likely to settle a name that these views leave in doubt, among the poses at which
+//! the causes are farthest apart.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -13,10 +13,10 @@ use crate::diagnose::search::prepared::evidence_of_bases;
 use crate::plane::Plane;
 use crate::rng::Seed;
 
-/// Poses that are looked at closely.
+/// Number of poses that are simulated.
 const CLOSELY: usize = 12;
 
-/// What a view would do where the causes are farthest apart, the best first.
+/// Prospects of a view at the poses where the causes are farthest apart, best first.
 fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<NextView> {
     let separation_now = contest.separation(&contest.information);
     let pose = |(z_m, theta_rad, azimuth_rad)| {
@@ -27,7 +27,7 @@ fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<Ne
         let (chance, why) = (0.0, String::new());
         let view =
             NextView { z_m, theta_rad, azimuth_rad, separation_now, separation_then, chance, why };
-        // Square of the standard errors between a cause and another, over all pairs.
+        // Squared standard errors between two causes, over all pairs.
         Some((contest.all_apart(&with), view, a))
     };
     let mut all: Vec<_> = poses().into_par_iter().filter_map(pose).collect();
@@ -39,15 +39,15 @@ fn prospects(contest: &Contest<'_>, outlook: &Outlook<'_>, seed: Seed) -> Vec<Ne
     };
     let mut all: Vec<_> = all.into_par_iter().map(closely).collect();
     all.sort_by(|x, y| y.0.chance.total_cmp(&x.0.chance));
-    // The best of many draws was lucky: its chance is that of others.
+    // The best of many estimates is biased upwards: its chance is estimated again from other draws.
     if let Some((best, a)) = all.first_mut() {
         best.chance = contest.chance(a, seed.stream("diagnose/next-view/chosen"));
     }
     all.into_iter().map(|(view, _)| view).collect()
 }
 
-/// Give advice to every finding of the layer that is not sure of its name, where a view is likely to
-/// settle it or nothing else can be said of it.
+/// Suggests a view for every finding of the layer whose name is in doubt, where the view is likely to settle
+/// it or the finding has several names.
 pub fn advise(
     found: &mut [Finding],
     scene: &Scene<'_>,

@@ -58,8 +58,8 @@ impl Stand {
     }
 }
 
-/// What frontal views cannot tell: a bowl that stands still in the picture, and one that goes with
-/// the distance, the same while the target is at one.
+/// Two bowls that frontal views cannot tell apart: one fixed in the picture and one that changes with the
+/// distance, which are the same while the target stays at one distance.
 fn bases() -> [Basis; 2] {
     [0.0, 1.0].map(|p| Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(p)))
 }
@@ -85,12 +85,12 @@ fn stated(p: [f64; 2]) -> Vec<Alternative> {
     NAMES.into_iter().zip(p).map(of).collect()
 }
 
-/// A bowl of `k` px in the corner's radius, by the first or the second name.
+/// A bowl of `k` px at the corner's radius, by the first or the second name.
 fn bowl(which: usize, k: f64) -> Term {
     Term { statistic: Statistic::Bias, basis: bases()[which].clone(), coefficients: vec![k] }
 }
 
-/// With the term's bias, and noise of `sigmas` of what the weights say.
+/// The view with the term's bias, and noise of `sigmas` times the standard deviation of the weights.
 fn recorded(mut view: ViewData, term: &Term, sigmas: f64, rng: &mut Stream) -> ViewData {
     for ((y, place), w) in view.response.iter_mut().zip(view.places.iter()).zip(&view.weight) {
         let white: f64 = StandardNormal.sample(rng);
@@ -104,7 +104,7 @@ fn frontal(outlook: &Outlook<'_>, term: &Term, sigmas: f64, rng: &mut Stream) ->
     views.into_iter().flatten().map(|view| recorded(view, term, sigmas, rng)).collect()
 }
 
-/// Poses by what they promise, for a bowl of `k` seen without noise, and how far apart the names are.
+/// Prospects for a noise-free bowl of `k` px, and how far apart the names are now.
 fn advised(size: [f64; 2], k: f64) -> (Vec<NextView>, f64) {
     let (outcome, seed) = (in_doubt(), Seed(3));
     Stand::of(size).with(|outlook| {
@@ -120,14 +120,14 @@ fn what_frontal_views_confuse_asks_for_another_distance_or_tilt() {
     let (all, now) = advised(WALL_M, 0.05);
     let best = &all[0];
     assert!(now < 3.0 && best.separation_then > 2.0 * now, "{now} {best:?}");
-    // As often as one of the two names is right.
+    // Nearly as often as one of the two names is right.
     assert!(best.chance > 0.9, "{best:?}");
-    // A cause that is hardly there is settled by no view.
+    // No view settles a cause that is hardly there.
     let (all, _) = advised(WALL_M, 0.0005);
     assert!(all.iter().all(|p| p.chance < 0.1), "{:?}", all[0]);
 }
 
-/// Of a small board far away little is left in the picture.
+/// A small board far away fills little of the picture.
 #[test]
 fn a_small_board_promises_less_and_is_asked_for_near_by() {
     let [wall, board] = [WALL_M, BOARD_M].map(|size| advised(size, 0.03).0.swap_remove(0));
@@ -137,7 +137,7 @@ fn a_small_board_promises_less_and_is_asked_for_near_by() {
     );
 }
 
-/// Of a board that is faced, by the camera's focal length alone.
+/// For a frontal board this depends on the focal length alone.
 #[test]
 fn the_edge_is_as_far_as_it_is_in_the_picture() {
     let stand = Stand::of(BOARD_M);
@@ -152,7 +152,7 @@ fn the_edge_is_as_far_as_it_is_in_the_picture() {
     });
 }
 
-/// Where the views lost nearly all, another is not asked for; and the room's light stays on.
+/// No view is suggested where nearly all depth was lost, and the room's light stays as it was.
 #[test]
 fn a_view_is_asked_for_where_depth_comes_back_and_in_the_light_there_is() {
     let [open, cut] = [None, Some(Step::whole(Axis::Z, 3.0, 0.05))].map(|lost| Stand {
@@ -171,8 +171,8 @@ fn a_view_is_asked_for_where_depth_comes_back_and_in_the_light_there_is() {
     assert!(weight(&open, 4.0).is_some() && weight(&cut, 4.0).is_none());
 }
 
-/// Truths of either name, recorded with noise; where the name is in doubt, a view more settles it as
-/// often as was promised: within three standard errors.
+/// With either name true and with noise, one more view settles a name in doubt as often as predicted,
+/// within three standard errors.
 #[test]
 fn a_view_settles_the_name_as_often_as_promised() {
     let (outcome, stand) = (in_doubt(), Stand::of(WALL_M));

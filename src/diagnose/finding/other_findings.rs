@@ -8,17 +8,17 @@ use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::model::Covariance;
 use crate::terms::{Axis, Statistic};
 
-/// A finding with this name and nothing else said yet; no test has weighed the name.
+/// A finding with this name and nothing else filled in; no test has weighed the name.
 pub fn named(effect: &'static str, statistic: Statistic, axis: Axis) -> Finding {
     of_names(&[effect], statistic, axis, None)
 }
 
-/// A finding that has no name, and nothing else said yet.
+/// A finding without a name and with nothing else filled in.
 pub fn nameless(statistic: Statistic, axis: Axis) -> Finding {
     of_names(&[], statistic, axis, None)
 }
 
-/// A finding of this shape with one of these names, best first, or with none, and nothing else said yet.
+/// A finding of this shape with these possible names, best first, or none, and nothing else filled in.
 pub fn of_names(
     names: &[&'static str],
     statistic: Statistic,
@@ -69,7 +69,7 @@ pub fn texture(found: TextureFinding, sigma_mm: f64, replicated: Option<bool>) -
         of_some: found.of_some,
         ..of_names(&found.families, found.statistic, found.axis, found.words)
     };
-    // Beside a name what was measured would be lost.
+    // The text of a name does not have what was measured.
     if let Some(measured) = finding.shape.as_ref().filter(|_| finding.effect.is_some()) {
         finding.physics += &format!(" Measured here: {measured}.");
     }

@@ -15,18 +15,18 @@ use crate::scene::TargetFrame;
 use crate::stats::median;
 use crate::terms::{Extent, PixelContext, Pixels, Statistic};
 
-/// Where a board is held: distances, m, and tilts, degrees.
+/// Poses of a board: distances, m, and tilts, degrees.
 const Z_M: [f64; 12] = [0.6, 0.8, 1.0, 1.2, 1.5, 1.8, 2.1, 2.5, 2.9, 3.3, 3.7, 4.0];
 const TILTS_DEG: [f64; 7] = [0.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0];
 /// Directions, 45 degrees apart.
 const AZIMUTHS: u32 = 8;
-/// The picture is looked at in so many patches across.
+/// Number of patches across the picture.
 const ACROSS: usize = 32;
-/// Beyond this no depth comes back, m.
+/// Farthest depth that is measured, m.
 const FARTHEST_M: f64 = 8.0;
 
-/// The room and the sensor as they were last in these views: time, temperature and ambient light alone.
-/// What the last does not know is as it was before.
+/// Time, temperature and ambient light of the last of these views. Where the last does not state one, the
+/// latest known value is taken.
 fn last_conditions(views: &[SurveyedView]) -> PixelContext {
     let mut all: Vec<&PixelContext> = views.iter().filter_map(|v| v.places.first()).collect();
     all.sort_by(|a, b| a.session_s.total_cmp(&b.session_s));
@@ -41,7 +41,7 @@ fn last_conditions(views: &[SurveyedView]) -> PixelContext {
     }
 }
 
-/// A sensor that could take a view, and what a view of its is worth.
+/// A sensor that could take a view, and the weight of such a view.
 pub struct Outlook<'a> {
     pub statistic: Statistic,
     pub camera: &'a Camera,
@@ -50,25 +50,24 @@ pub struct Outlook<'a> {
     pub sigma: &'a SigmaModel,
     /// Extent of the target in use: the next view has no larger one.
     pub reach: &'a Extent,
-    /// Places of the views are so far from the target's edge at least, px.
+    /// Least distance of the views' places from the target's edge, px.
     pub rim_px: f64,
-    /// The room and the sensor, as they were last.
+    /// Latest conditions of the room and the sensor.
     pub last: PixelContext,
-    /// What share of the depth does not come back, and where.
+    /// Losses of depth: which share, and where.
     pub lost: &'a [Step],
-    /// Weight of a pixel of a target in the middle: over its variance for the mean, as it is for the
-    /// variance.
+    /// Weight of a pixel of a centred target. For the mean it is divided by the pixel's variance.
     pub worth: f64,
-    /// Of a view's own level or plane, as the recording's views have it.
+    /// Prior precision of a view's own level or plane, as in the recording's views.
     pub precision: Vec<f64>,
 }
 
-/// Distance, m, tilt and azimuth, rad.
+/// Poses: distance, m, tilt and azimuth, rad.
 pub fn poses() -> Vec<(f64, f64, f64)> {
     let mut all = Vec::new();
     for z in Z_M {
         for tilt in TILTS_DEG {
-            // Facing the target there is no direction.
+            // A frontal target has no direction of tilt.
             let directions = if tilt == 0.0 { 1 } else { AZIMUTHS };
             for k in 0..directions {
                 all.push((z, tilt.to_radians(), f64::from(k) * std::f64::consts::FRAC_PI_4));
@@ -86,7 +85,7 @@ impl Outlook<'_> {
         enough.then_some(data)
     }
 
-    /// The same however little is seen, and the pixels that are measured.
+    /// Same however little is seen, with the number of measured pixels.
     fn look(&self, plane: &Plane) -> (ViewData, f64) {
         let side = self.camera.width.div_ceil(ACROSS).max(1);
         let pixels = Pixels::new(self.camera, self.rays, self.scale_px_m);
@@ -115,7 +114,7 @@ impl Outlook<'_> {
         (data, measured)
     }
 
-    /// Where a pixel lies on the target, if it does.
+    /// Place of a pixel on the target; `None` off the target or where no depth is measured.
     fn place(
         &self,
         plane: &Plane,
@@ -143,8 +142,8 @@ impl Outlook<'_> {
         Some(PixelContext { session_s, temperature_c, ambient, ..place })
     }
 
-    /// From a point of the target along its sides to the nearest of its edges that is in the picture, px;
-    /// the picture's own border is none.
+    /// Distance from a point of the target, along its sides, to the nearest of its edges inside the
+    /// picture, px; the picture's own border does not count.
     fn edge_px(&self, place: &PixelContext, point: &Vector3<f64>, board: &TargetFrame) -> f64 {
         let (camera, [left, right]) = (self.camera, self.reach.right);
         let [top, bottom] = self.reach.down;
@@ -161,10 +160,10 @@ impl Outlook<'_> {
     }
 }
 
-/// Fewer carry no plane.
+/// More patches than this are needed for a plane.
 const MIN_PATCHES: usize = 12;
 
-/// What all views of a layer have in common when another is taken.
+/// Outlook on another view of a layer; `None` where no view gives the weight of a pixel.
 pub fn outlook<'a>(
     scene: &'a Scene<'_>,
     sigma: &'a SigmaModel,
@@ -174,7 +173,7 @@ pub fn outlook<'a>(
 ) -> Option<Outlook<'a>> {
     let views = &scene.survey.views;
     let places = views.iter().flat_map(|v| v.places.iter());
-    // Of the view's own nuisances; how known terms scatter is nothing to plan by.
+    // The view's own nuisances only: planning ignores the scatter of known terms.
     let own = if scene.statistic == Statistic::Bias { MEAN_PRECISION.len() } else { 1 };
     let mut outlook = Outlook {
         statistic: scene.statistic,
@@ -189,9 +188,8 @@ pub fn outlook<'a>(
         worth: 1.0,
         precision: scene.data.first()?.precision[..own].to_vec(),
     };
-    // A pixel's weight in the views there are: theirs over what they would weigh by their poses. The
-    // target is not always in the middle, and not all of it is used. What was lost in some of them is left
-    // to the median.
+    // A pixel's weight in the existing views: their weight over that expected from their poses. The target is
+    // not always centred, and not all of it is used. The median takes care of losses in some of them.
     let worth = |view: &ViewData| {
         let at = view.places.first()?;
         let z = view.places.iter().map(|p| p.z).sum::<f64>() / view.places.len() as f64;

@@ -1,4 +1,4 @@
-//! The parameters that people know a finding by.
+//! The parameters reported for a finding.
 
 use serde_json::{Map, Value, json};
 
@@ -11,12 +11,12 @@ pub fn estimate(value: f64, std_error: f64) -> Value {
     json!({ "value": value, "std_error": std_error })
 }
 
-/// A single one, by its name.
+/// A single parameter, by its name.
 pub fn one(name: &str, value: f64, std_error: f64) -> Map<String, Value> {
     Map::from_iter([(name.into(), estimate(value, std_error))])
 }
 
-/// Of a family's fitted shape, whose formula is off by this share; a curve without a name has none.
+/// Parameters of a family's fitted shape, whose formula has this relative error; none for a nameless curve.
 pub fn parameters(family: Option<&str>, formula_error: f64, fit: &Fitted) -> Map<String, Value> {
     let all = match family {
         Some(RECALIBRATE) => sigma_factor(fit),
@@ -27,7 +27,7 @@ pub fn parameters(family: Option<&str>, formula_error: f64, fit: &Fitted) -> Map
     all.map(|e| (e.parameter.to_string(), estimate(e.value, e.std_error))).collect()
 }
 
-/// Of a level alone.
+/// Factor of sigma, for a level only.
 fn sigma_factor(fit: &Fitted) -> Vec<Estimate> {
     let level = |b: &[f64]| (0.5 * b[0]).exp();
     if *fit.shape == Basis::Level { vec![fit.estimate("sigma_factor", &level)] } else { Vec::new() }

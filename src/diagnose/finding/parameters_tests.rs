@@ -1,4 +1,4 @@
-//! Parameters from shapes that are exactly a family's, and their errors against Monte Carlo.
+//! Parameters of exact family shapes, and their errors against Monte Carlo.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -50,7 +50,7 @@ fn of(
     (number("value"), number("std_error"))
 }
 
-/// Effect, basis, its coefficients, the parameter, its value, and how near.
+/// Effect, basis, its coefficients, the parameter, its value, and the relative tolerance.
 fn exact() -> Vec<Case> {
     let phase = 0.7f64;
     // 64 places over a period miss a sine's top by up to 1 - cos(pi / 64) = 0.12 %.
@@ -195,7 +195,7 @@ fn an_exact_shape_gives_its_parameters() {
     }
 }
 
-/// What is printed of a finding simulates it: it parses, to four digits the same.
+/// The printed form of a finding simulates it: it parses, to the same four digits.
 #[test]
 fn a_finding_is_an_effect_that_the_simulator_takes() {
     for (family, basis, beta, name, expected, tolerance) in exact() {
@@ -221,7 +221,7 @@ fn a_finding_is_an_effect_that_the_simulator_takes() {
 }
 
 /// Standard errors by the delta method against 20,000 draws. A standard deviation is then known
-/// to 0.5 %; coefficients that move by 1 % bend the parameter's curve by less than another 1 %.
+/// to 0.5 %; nonlinearity over 1 % of the coefficients adds less than another 1 %.
 #[test]
 fn errors_are_what_scattered_coefficients_give() {
     let mut rng = Seed(3).stream("parameters/delta");
@@ -229,7 +229,7 @@ fn errors_are_what_scattered_coefficients_give() {
     for (family, basis, beta, name, expected, _) in exact() {
         let k = beta.len();
         let top = beta.iter().map(|b| b.abs()).fold(0.0, f64::max);
-        // Coefficients that hang together.
+        // Correlated coefficients.
         let root = DMatrix::from_fn(k, k, |i, j| match i.cmp(&j) {
             std::cmp::Ordering::Less => 0.0,
             std::cmp::Ordering::Equal => 0.01 * top,
@@ -255,7 +255,7 @@ fn errors_are_what_scattered_coefficients_give() {
     }
 }
 
-/// A covariance of the wrong size is none: the error is not known, and is not zero.
+/// A covariance of the wrong size counts as none: the error is unknown, not zero.
 #[test]
 fn without_a_covariance_the_error_is_null() {
     let map = told("recalibrate", &Basis::Level, &[0.1], &DMatrix::zeros(0, 0));

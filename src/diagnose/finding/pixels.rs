@@ -1,4 +1,4 @@
-//! Found terms, pixel by pixel, and what is typical of the pixels.
+//! Found terms at every pixel, and typical values of the pixels.
 
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ use crate::model::SigmaModel;
 use crate::stats::mean;
 use crate::terms::{DISPARITY_UNIT_PX, PixelContext, Pixels, Statistic, Term, disparity_power};
 
-/// How much frames of a view resemble one another, by lag, where that was found to be noise.
+/// Noise correlation between frames of a view, by lag; zero where none was found or is known.
 pub(in crate::diagnose) fn common(
     structure: &[Structure],
     textures: &[TextureFinding],
@@ -51,11 +51,11 @@ pub(in crate::diagnose) fn typical_sigma_px(fields: &[Field]) -> f64 {
     f64::from(crate::stats::median_in_place(&mut all))
 }
 
-/// Correlation of successive frames below which they are taken to have nothing in common.
+/// Correlation of successive frames below which they count as independent.
 const HARDLY_STILL: f64 = 0.1;
 
-/// What the pixels' errors are held against: the model's sigma, as far as it says something (`None`: two recordings
-/// are compared, wherever they are), and what was found of the variance.
+/// What the pixels' errors are whitened by: the model's sigma where it says something (`None`: everywhere,
+/// when two recordings are compared), and the variance terms found.
 pub(in crate::diagnose) struct Whitener<'a> {
     pub sigma: Option<&'a SigmaModel>,
     pub terms: &'a [Term],
@@ -71,8 +71,8 @@ pub(in crate::diagnose) fn measure_tails(
 ) {
     let factors = pixel_terms(fields, terms, survey, bench);
     structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
-        // Where the model says nothing of the noise, errors are no tails, and none where a pixel may see what is
-        // behind the target as well.
+        // Places where the model says nothing of the noise are excluded, and pixels that may also see what is
+        // behind the target.
         let theta = field.plane.theta();
         let rim = rim_px(&bench.sensor.camera) as f32;
         let is_told = |k: usize| {
@@ -83,7 +83,7 @@ pub(in crate::diagnose) fn measure_tails(
         let told: Vec<bool> = (0..field.pixels.len()).map(is_told).collect();
         let factor = |k: usize| factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
         let sigma_px: Vec<f32> = (0..told.len()).map(|k| field.sigma[k] * factor(k)).collect();
-        // Single frames, unless what stands still in them could be taken for a tail.
+        // Single frames, unless their constant part could be taken for a tail.
         let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
         let whitened = |frame: &Vec<f32>| {
             let white = |k: usize| {
@@ -109,7 +109,7 @@ pub(in crate::diagnose) fn measure_tails(
     });
 }
 
-/// The chosen terms with their common coefficients.
+/// The chosen terms with the coefficients of their common fit.
 pub fn terms_of(outcome: &Outcome, statistic: Statistic) -> Vec<Term> {
     (0..outcome.chosen.len())
         .map(|k| Term {
@@ -130,15 +130,15 @@ pub(in crate::diagnose) fn typical_sigma_mm(fields: &[Field]) -> f64 {
     f64::from(crate::stats::median_in_place(&mut all))
 }
 
-/// Terms that are the same in every picture, but for a power of the disparity that they grow with: at every
-/// pixel of the picture, at the disparity at which they are in px.
+/// Terms fixed in the picture up to a power of the disparity, tabulated at every pixel for a disparity of
+/// [`DISPARITY_UNIT_PX`].
 struct Still {
     power: f64,
     values: Vec<f64>,
 }
 
 impl Still {
-    /// Of all terms that are such, a power each; and the others.
+    /// Splits the terms into these, one for each power, and the others.
     fn of(terms: &[Term], bench: &Workbench<'_>) -> (Vec<Self>, Vec<Term>) {
         let mut by_power: Vec<(f64, Vec<Term>)> = Vec::new();
         let mut others = Vec::new();
@@ -165,13 +165,13 @@ impl Still {
         (by_power.into_iter().map(still).collect(), others)
     }
 
-    /// At pixel `i` of the picture on a surface of this disparity, px.
+    /// Value at pixel `i` of the picture on a surface of this disparity, px.
     fn at(&self, i: u32, disparity: f64) -> f64 {
         disparity_power(self.power, disparity) * self.values[i as usize]
     }
 }
 
-/// The terms at every pixel; empty when there are none.
+/// Sum of the terms at every pixel of every field; empty when there are none.
 pub(in crate::diagnose) fn pixel_terms(
     fields: &[Field],
     terms: &[Term],
@@ -212,7 +212,7 @@ mod tests {
     use crate::simulate::kinect_v1;
     use crate::terms::{Basis, Coordinate, Modulation};
 
-    /// Looked at once in the picture, and in every pixel of a tilted view as it is.
+    /// Tabulated values agree with the terms themselves at the pixels of a tilted view.
     #[test]
     fn what_stands_still_is_its_picture_times_a_power_of_the_disparity() {
         let sensor = kinect_v1(4);

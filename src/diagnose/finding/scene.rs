@@ -13,18 +13,18 @@ pub struct Scene<'a> {
     pub statistic: Statistic,
     pub survey: &'a Survey,
     pub data: Vec<ViewData>,
-    /// Depth error in mm of one px of disparity, at a place.
+    /// fx * baseline, px m.
     pub scale_px_m: f64,
     pub corner_px: f64,
 }
 
 impl Scene<'_> {
-    /// The terms' values together, what the views' planes take taken out.
+    /// Sum of the terms' values, without what the views' planes absorb.
     pub fn values(&self, terms: &[Term]) -> Vec<Vec<f64>> {
         self.levelled(|view| view.places.iter().map(|p| Term::sum(terms, p)).collect())
     }
 
-    /// What the terms leave of the responses, levelled alike.
+    /// Responses without the terms, levelled in the same way.
     pub fn without(&self, terms: &[Term]) -> Vec<Vec<f64>> {
         self.levelled(|view| view.without(terms))
     }
@@ -41,7 +41,7 @@ impl Scene<'_> {
     }
 }
 
-/// Take the view's plane out of `values`. What is held beside it would take a part of a large effect, too.
+/// Subtracts the view's plane from `values`. The other nuisances would also absorb a part of a large effect.
 fn level(view: &ViewData, values: &mut [f64]) {
     let Some(plane) = view.plane_of(values) else { return };
     for (p, y) in view.places.iter().zip(values) {

@@ -1,8 +1,8 @@
-//! A curve in words.
+//! Describes curves in words.
 
 use crate::terms::{Axis, Basis, Coordinate};
 
-/// What a nameless curve looks like.
+/// Description of a nameless curve.
 pub fn words(basis: &Basis, beta: &[f64]) -> String {
     match basis {
         Basis::Ring { period, over, .. } | Basis::Waves { period, over, .. } => {
@@ -45,13 +45,13 @@ fn place(value: f64, over: Coordinate) -> String {
     digits(value) + unit
 }
 
-/// To three digits.
+/// Formats a value to three digits, with at most four decimals.
 pub fn digits(value: f64) -> String {
     let decimals = (2.0 - value.abs().max(1e-2).log10().floor()).clamp(0.0, 4.0) as usize;
     crate::units::decimals(value, decimals)
 }
 
-/// `at` says where the k-th node is.
+/// Description of a curve with the node values `beta`; `at` formats the position of the k-th node.
 fn curve(beta: &[f64], at: &dyn Fn(f64) -> String) -> String {
     let n = beta.len();
     let [low, high] = crate::stats::range(beta.iter().copied());
@@ -68,7 +68,7 @@ fn curve(beta: &[f64], at: &dyn Fn(f64) -> String) -> String {
         .fold((0, 0.0), |best, s| if s.1 > best.1 { s } else { best });
     let net = (beta[n - 1] - beta[0]).abs();
     let turns = {
-        // Turns that matter: by a quarter of the height.
+        // Only turns by more than a quarter of the height count.
         let (mut turns, mut extreme, mut direction) = (0, beta[0], 0.0f64);
         for &b in beta {
             let moved = b - extreme;

@@ -1,8 +1,8 @@
-//! The constant of a bias that planes take up whole, from reference distances.
+//! Estimates, from reference distances, the constant of a bias that planes absorb whole.
 //!
-//! A bias that stands still in the picture may hold any constant: every plane takes it up, and the
-//! joint fit leaves it at none on average over the picture. Taken out so it moves all distances by
-//! what nobody has measured. Reference distances measure it.
+//! An image-fixed bias may hold any constant: every plane absorbs it, and the joint fit makes it zero
+//! on average over the image. Correcting by it would shift all distances by an unmeasured amount.
+//! Reference distances measure it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,28 +14,29 @@ use crate::terms::{
     Basis, DISPARITY_UNIT_PX, Modulation, PixelContext, Pixels, Term, affine_parts,
 };
 
-/// Biases of one power of the disparity, whose constant planes do not tell.
+/// Biases of one power of the disparity, whose constant planes do not determine.
 pub struct Family {
     power: f64,
-    /// Root mean square over the picture, px: the constant is of no other size than the shapes are.
+    /// Root mean square over the image, px: the constant is taken to be of the size of the shapes.
     usual: f64,
 }
 
 impl Family {
-    /// The usual size of what has the same disparity at all distances, px.
+    /// Usual size of a constant that is the same disparity at all distances, px; 0 for other powers.
     pub fn still_px(&self) -> f64 {
         if self.power == 0.0 { self.usual } else { 0.0 }
     }
 
-    /// What its constant, of the usual size, makes of a distance, m.
+    /// Change of a distance, m, when a constant of the usual size is subtracted.
     pub fn moves_m(&self, c: &ReferencedView) -> f64 {
         let disparity = c.px_m / c.z;
         -c.moved_by_a_px() * self.usual * (disparity / DISPARITY_UNIT_PX).powf(self.power)
     }
 }
 
-/// Let the learnt biases of `added` leave the references where they were measured. `checked` is what
-/// the references say with these biases, and all laws, taken out; `variances` theirs, m^2.
+/// Adds constants to the learnt biases of `added` so that corrected distances agree with the
+/// references. `checked` are the references with these biases, and all laws, subtracted, and
+/// `variances` their variances, m^2.
 pub fn anchor(
     added: &mut [Effect],
     checked: &[ReferencedView],
@@ -78,13 +79,13 @@ fn mean_square(term: &Term, pixels: &Pixels<'_>) -> f64 {
     sum / f64::max(count, 1.0)
 }
 
-/// Each family's constant, in its usual size, with its standard error.
+/// Constant of each family in units of its usual size, with its standard error.
 fn constants(families: &[Family], checked: &[ReferencedView], variances: &[f64]) -> Vec<[f64; 2]> {
     let n = families.len();
     let mut information = DMatrix::zeros(n + 2, n + 2);
     let mut score = DVector::zeros(n + 2);
     for (c, variance) in checked.iter().zip(variances) {
-        // On a tilted target the axis meets it elsewhere by two small angles.
+        // On a tilted target two small angles shift the point where the axis meets it.
         let angles = c.slope.map(|slope| c.z * slope);
         let row =
             DVector::from_iterator(n + 2, families.iter().map(|f| f.moves_m(c)).chain(angles));
@@ -97,9 +98,10 @@ fn constants(families: &[Family], checked: &[ReferencedView], variances: &[f64])
     (0..n).map(|k| [constants[k], covariance[(k, k)].sqrt()]).collect()
 }
 
-/// Take out of the lenses of `added` what every plane takes up: where no distance was measured none may
-/// move. Across the optical axis a lens is its stretch times the disparity beyond the reference's, and the
-/// stretch has a mean over the picture. Its slope bends tilted planes, and stays.
+/// Subtracts from the lenses of `added` what every plane absorbs: where no distance was measured none
+/// may move. On a plane across the optical axis a lens is its stretch times the disparity beyond the
+/// reference's; the stretch's mean over the image is subtracted. Its slope bends tilted planes, and
+/// stays.
 pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
     let rays = camera.rays();
     let pixels = Pixels::new(camera, &rays, 1.0);
@@ -115,7 +117,7 @@ pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
             let stretch = dot(&lens.coefficients, &mean);
             for (times, share) in [(Modulation::Disparity, -1.0), (Modulation::One, reference_px)] {
                 let constant = lift(effect, times, share * stretch, 0.0);
-                // It errs as the lens does.
+                // It has the same error as the lens.
                 for factor in effect.covariance.iter_mut().flat_map(|c| &mut c.factors) {
                     factor[constant] += share * dot(&factor[span.clone()], &mean);
                 }
@@ -124,14 +126,15 @@ pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
     }
 }
 
-/// Of a lens's columns, a pixel of disparity beyond the reference's.
+/// Mean of each lens column over the image, one pixel of disparity beyond the reference's.
 fn mean_stretch(lens: &Basis, reference_px: f64, pixels: &Pixels<'_>) -> Option<Vec<f64>> {
     let beyond = |place| PixelContext { disparity: reference_px + 1.0, slope: [0.0; 2], ..place };
     let parts = affine_parts(lens, pixels, beyond)?;
     Some(parts.iter().map(|part| part[0]).collect())
 }
 
-/// Add a constant of the disparity, px, to an effect's shape; its number among all coefficients.
+/// Adds a constant of the disparity, px, to an effect's shape; returns its index among all
+/// coefficients.
 fn lift(effect: &mut Effect, times: Modulation, shift: f64, variance: f64) -> usize {
     let of_times = |t: &Term| matches!(&t.basis, Basis::Affine { times: own } if *own == times);
     let at = effect.shape.iter().position(of_times).unwrap_or_else(|| {

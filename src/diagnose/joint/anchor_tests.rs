@@ -8,7 +8,7 @@ use crate::terms::Coordinate;
 
 const PX_M: f64 = 43.5;
 
-/// A bowl with a constant that nobody knows, and its share of the disparity's power.
+/// A bowl with an unknown constant, times this power of the disparity.
 fn bowl(power: f64) -> Effect {
     let basis = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::power(power));
     let term = Term::bias(basis, vec![0.8]);
@@ -16,7 +16,7 @@ fn bowl(power: f64) -> Effect {
     Effect { shape: vec![term], covariance: Some(covariance), ..Effect::default() }
 }
 
-/// References whose distances are too short by a constant of the disparity.
+/// References whose distances are too short by a constant of the disparity, times this power of it.
 fn references(
     count: usize,
     power: f64,
@@ -42,7 +42,7 @@ fn shift_of(effect: &Effect) -> [f64; 2] {
     [affine.coefficients[0], effect.covariance.as_ref().unwrap().variances[1].sqrt()]
 }
 
-/// The constant comes back, for either power, within what is said of its error.
+/// The constant is recovered, for either power, within its stated error.
 #[test]
 fn references_tell_the_constant() {
     let camera = kinect_v1(4).camera;
@@ -60,7 +60,7 @@ fn references_tell_the_constant() {
     }
 }
 
-/// Where there is no bias that stands still, there is nothing to lift.
+/// Without an image-fixed bias no constant is added.
 #[test]
 fn a_constant_alone_is_nothing() {
     let camera = kinect_v1(4).camera;
@@ -69,7 +69,7 @@ fn a_constant_alone_is_nothing() {
     assert!(added[0].shape.is_empty());
 }
 
-/// References that are hardly known say hardly anything.
+/// References of large variance hardly move the constant.
 #[test]
 fn poor_references_move_little() {
     let camera = kinect_v1(4).camera;
@@ -80,7 +80,7 @@ fn poor_references_move_little() {
     assert!(error > 0.1, "{error}");
 }
 
-/// What is told of a lens moves no plane as a whole, and bends every one as before.
+/// The reported lens moves no plane as a whole, and bends every one as before.
 #[test]
 fn a_lens_without_references_moves_no_plane() {
     let camera = kinect_v1(4).camera;
@@ -95,7 +95,7 @@ fn a_lens_without_references_moves_no_plane() {
     let pixels = Pixels::new(&camera, &rays, PX_M);
     let shape = &added[0].shape;
     assert_eq!(shape.len(), 3);
-    // What is taken out errs with the lens: as the coefficients, so the factor.
+    // What is subtracted has the lens's error: the factor changes as the coefficients do.
     let factor = &added[0].covariance.as_ref().unwrap().factors[0];
     let coefficients: Vec<f64> = shape.iter().flat_map(|t| t.coefficients.clone()).collect();
     assert_eq!([factor.len(), coefficients.len()], [8, 8]);
@@ -109,7 +109,7 @@ fn a_lens_without_references_moves_no_plane() {
         for disparity in [tilted, 60.0] {
             let at = PixelContext { disparity, slope: [0.0; 2], ..place };
             let [px, lens] = [&shape[..], &shape[..1]].map(|s| Term::sum(s, &at));
-            // Whatever the plane, it is a multiple of its own disparity and a constant.
+            // For any plane it is a multiple of its own disparity and a constant.
             let taken = (disparity - 26.0) * -coefficients[2];
             assert!((lens - px - taken).abs() < 1e-12, "{k}: {lens} {px} {taken}");
         }

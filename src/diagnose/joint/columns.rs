@@ -1,5 +1,5 @@
-//! The columns of the joint fit, terms and then two smooth maps over the picture, and what a view says of
-//! them with its plane profiled out.
+//! Columns of the joint fit: terms, then two smooth maps over the image. Also a view's evidence on
+//! them, with its plane profiled out.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,37 +9,37 @@ use crate::diagnose::search::outcome::Chosen;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
 
-/// Precision of the nodes themselves beside that of their differences (`SMOOTHNESS`).
+/// Ridge precision of the nodes, relative to that of their second differences (`SMOOTHNESS`).
 const RIDGE: f64 = 0.1;
-/// So much the affine part of a map is held to zero, over the mean information on a node.
+/// Precision that holds a map's affine part to zero, over the mean information on a node.
 const HELD: f64 = 1e4;
-/// Pixels to a node of a map.
+/// Pixels per map node.
 const NODE_PX: usize = 32;
-/// Splines of a map that are not zero at a place.
+/// Number of a map's splines that are nonzero at a place.
 const SPLINES: usize = 16;
 
-/// What is fitted: terms, then the nodes of the maps.
+/// Columns of the fit: the terms', then the maps' nodes.
 pub struct Columns {
     pub bases: Vec<Basis>,
-    /// Precision of the terms' coefficients before anything was measured.
+    /// Prior precision of the terms' coefficients.
     pub precision: DVector<f64>,
     pub gauges: Vec<Option<Gauge>>,
     pub maps: [Basis; 2],
-    /// Nodes of a map from one row to the next.
+    /// Map nodes per row.
     across: usize,
-    /// What planes absorb of the second map.
+    /// The part of the second map that planes absorb.
     pub far_gauge: Option<Gauge>,
-    /// What affine parts that are taken out grow with, each once.
+    /// Modulations of the affine parts that are subtracted, each once.
     absorbed_times: Vec<Modulation>,
-    /// How much of 1, x and y times each of these is taken out of each column, a column each.
+    /// Amounts of 1, x and y times each of these that are subtracted, one column per column of the fit.
     absorbed: DMatrix<f64>,
-    /// Columns of the terms, and of both maps.
+    /// Number of columns of the terms, and of both maps.
     pub terms: usize,
     pub nodes: usize,
 }
 
 impl Columns {
-    /// Of terms that were chosen where all samples together weighed `weight`, 1/px^2.
+    /// Columns of terms chosen where the samples have a total weight of `weight`, 1/px^2.
     pub fn of(chosen: &[Chosen], camera: &Camera, weight: f64) -> Self {
         let rays = camera.rays();
         let pixels = Pixels::new(camera, &rays, 1.0);
@@ -49,7 +49,7 @@ impl Columns {
         let [width, height] = [camera.width, camera.height].map(|n| n as f64);
         let map = |times| Basis::Spline { width, height, across, down, times };
         let maps = [map(Modulation::One), map(Modulation::DisparitySquared)];
-        // The rest of a named shape over the same axis.
+        // A nameless curve that completes a named shape over the same axis.
         let is_rest = |c: &Chosen| {
             let axis = c.candidate.basis.axis();
             let mut named = chosen.iter().filter(|other| other.candidate.family.is_some());
@@ -58,7 +58,7 @@ impl Columns {
         let precision = |c: &Chosen| -> Vec<f64> {
             let n = c.candidate.basis.count();
             if is_rest(c) && c.gain > 0.0 {
-                // No node of it says more than the whole of it did, beyond the terms before it.
+                // No node may carry more than the curve's whole gain over the terms before it.
                 return vec![weight / (2.0 * c.gain * n as f64); n];
             }
             (0..n).map(|k| c.candidate.usual(k).powi(-2)).collect()
@@ -86,7 +86,7 @@ impl Columns {
         views.for_each(|view| self.add(view, &mut sum));
         let Evidence { mut a, b } = sum;
         a.fill_upper_triangle_with_lower_triangle();
-        // With c the `absorbed`, columns G and affine ones F: of G - F c.
+        // Equations of G - F c, with c = `absorbed`, columns G and affine columns F.
         let (c, n, m) = (&self.absorbed, self.absorbed.ncols(), self.absorbed.nrows());
         let crossed = a.view((0, n), (n, m)) * c;
         let twice = c.transpose() * (a.view((n, n), (m, m)) * c);
@@ -96,8 +96,8 @@ impl Columns {
         }
     }
 
-    /// Add a view's equations, of the columns with their affine parts in, and of the affine ones: most of
-    /// them are zero.
+    /// Adds a view's equations for the columns, affine parts included, and for the affine columns. Most
+    /// are zero at any one sample.
     fn add(&self, view: &ViewData, sum: &mut Evidence) {
         let Some(rows) = view.rows(&view.response) else { return };
         let first = |i: usize| {
@@ -112,14 +112,14 @@ impl Columns {
         rows.add_by_blocks(sum, first, touched, fill);
     }
 
-    /// What a view says beyond a fit, its plane profiled out: the score that is left. It is b - A beta of its
-    /// normal equations, which need not be held.
+    /// Score that a fit leaves in a view, its plane profiled out: b - A beta of its normal equations,
+    /// without forming them.
     pub fn left(&self, view: &ViewData, beta: &DVector<f64>) -> Option<DVector<f64>> {
         let affine = -(&self.absorbed * beta);
         let beta: Vec<f64> = beta.iter().chain(&affine).copied().collect();
         let (n, p) = (beta.len(), view.precision.len());
         let mut own = DMatrix::from_diagonal(&DVector::from_column_slice(&view.precision));
-        // Of each column the products with the nuisances and with what is left of the response.
+        // Products of each column with the nuisances and with the residual.
         let mut products = vec![0.0; n * (p + 1)];
         let mut seen = DVector::zeros(p);
         let mut row = vec![0.0; self.terms + 2 * SPLINES + self.absorbed.nrows()];
@@ -152,12 +152,12 @@ impl Columns {
         Some(left.rows(0, n) - self.absorbed.transpose() * left.rows(n, m))
     }
 
-    /// All columns, and the affine ones that are taken out of them.
+    /// Number of columns, including the affine ones that are subtracted.
     fn width(&self) -> usize {
         self.absorbed.ncols() + self.absorbed.nrows()
     }
 
-    /// The columns that are not zero where the maps' splines begin at node `first`.
+    /// Columns that may be nonzero where the maps' splines begin at node `first`.
     fn touched(&self, first: usize) -> impl Iterator<Item = usize> {
         let half = self.nodes / 2;
         let squares = (0..SPLINES).map(|k| k / 4 * self.across + k % 4);
@@ -167,7 +167,7 @@ impl Columns {
         (0..self.terms).chain(maps).chain(affine)
     }
 
-    /// The values of these columns at a place with their affine parts in, and the first node.
+    /// Fills these columns at a place, affine parts included, and returns the first node.
     fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
         let (terms, others) = row.split_at_mut(self.terms);
         let (nodes, affine) = others.split_at_mut(2 * SPLINES);
@@ -196,7 +196,7 @@ impl Columns {
         }
     }
 
-    /// All columns at a place, without what planes absorb of them.
+    /// Fills all columns at a place, the terms without what planes absorb of them.
     pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
         let (terms, nodes) = row.split_at_mut(self.terms);
         self.fill_terms(place, terms);
@@ -214,14 +214,14 @@ impl Columns {
         first..first + self.bases[term].count()
     }
 
-    /// The maps, and what planes absorb of the second.
+    /// The maps, and the affine part that planes absorb of the second.
     pub fn rest(&self) -> impl Iterator<Item = Basis> + '_ {
         let absorbed = self.far_gauge.iter().map(|gauge| gauge.term(&[]).0);
         self.maps.iter().cloned().chain(absorbed)
     }
 
-    /// What holds the nodes, for a mean information of one on each: smooth, small, and without
-    /// what planes absorb.
+    /// Penalty on the nodes, for a mean information of one on each: smooth, small, and without what
+    /// planes absorb.
     pub fn penalty(&self, smoothness: f64) -> DMatrix<f64> {
         let Basis::Spline { across, down, .. } = self.maps[0] else {
             return DMatrix::zeros(0, 0);
@@ -242,8 +242,8 @@ impl Columns {
         both.view_mut((0, 0), (n, n)).copy_from(&one);
         both.view_mut((n, n), (n, n)).copy_from(&one);
         if let Some(gauge) = &self.far_gauge {
-            // A slope that grows with the disparity's square bends tilted planes, and what is held
-            // to be nothing is taken for another shape: it is fitted, and left out of what is told.
+            // A slope that grows with the disparity's square bends tilted planes. Held to zero it would
+            // be taken for another shape, so it is fitted but not reported.
             for (map, absorbed) in [(0, 0..3), (n, 0..1)] {
                 for k in absorbed {
                     let affine = DVector::from_iterator(n, gauge.affine.iter().map(|a| a[k]));
@@ -256,8 +256,8 @@ impl Columns {
     }
 }
 
-/// What the columns' affine parts grow with, and what is taken out of each column of 1, x and y times each
-/// of it. What is a plane stays in: every view's own takes it up.
+/// Modulations of the columns' affine parts, and the amounts of 1, x and y times each to subtract from
+/// each column. A part that is a plane stays in: each view's own plane absorbs it.
 fn absorbed(
     bases: &[Basis],
     gauges: &[Option<Gauge>],

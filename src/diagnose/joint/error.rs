@@ -1,4 +1,4 @@
-//! How sure the joint posterior is: its covariance in a few factors.
+//! Covariance of the joint posterior, in a few factors.
 
 use std::ops::Range;
 
@@ -15,27 +15,26 @@ use crate::rng::Seed;
 use crate::solve::Cholesky;
 use crate::terms::Pixels;
 
-/// Factors are taken until they hold this share of the variance, place by place. The rest is each
-/// node's own.
+/// Share of the variance, pixel by pixel, that the factors must hold. The rest is independent per node.
 const HELD: f64 = 0.98;
 const MAX_FACTORS: usize = 40;
-/// The picture is looked at in pixels so far apart, at three distances.
+/// Spacing of the pixels at which the variance is evaluated, at three distances.
 const STRIDE: usize = 8;
-/// What no place shows is held against what is usual, by this much.
+/// Weight of the prior precision in the metric, for what no pixel shows.
 const SLIGHT: f64 = 1e-6;
-/// A cause has no name where nothing at all would bring its coefficients with more than this chance. Of 111 right names
-/// of two trials the largest was .03, in halves of a real Kinect's views .10; of two wrong ones, a bent target and a
-/// bowl beside larger errors without a name, .35 and .89.
+/// P-value above which a term loses its name. Of 111 right names of two trials the largest was .03, in
+/// halves of a real Kinect's views .10; of two wrong ones, a bent target and a bowl beside larger
+/// errors without a name, .35 and .89.
 const DISAGREED: f64 = 0.2;
-/// Rounds of the subspace iteration; its start has so many directions to spare (Halko, Martinsson
-/// and Tropp 2011).
+/// Rounds of the randomised subspace iteration, and its oversampling (Halko, Martinsson and Tropp
+/// 2011).
 const ROUNDS: usize = 4;
 const SPARE: usize = 8;
 
 impl Joint<'_> {
-    /// The covariance of all columns' coefficients. `left` is what each view says beyond the fit:
-    /// views scatter beyond their noise, and the posterior is as much wider. It is to hold on planes
-    /// at these disparities, px.
+    /// Covariance of all columns' coefficients, approximated for planes at these disparities, px.
+    /// `left` are the scores that the fit leaves in each view: views scatter beyond their noise, and
+    /// the posterior is as much wider.
     pub fn error(
         &self,
         s: &Settled,
@@ -53,7 +52,7 @@ impl Joint<'_> {
         let free = inverse.component_mul(&information).sum();
         let covariance = inverse * (scatter / free.max(1.0)).max(1.0);
         let seen = self.seen(&places, camera, disparities);
-        // With this metric every place counts alike, whatever its variance.
+        // This metric weights every pixel alike, whatever its variance.
         let mut metric = DMatrix::zeros(n, n);
         for (row, variance) in seen.iter().zip(variances(&seen, &covariance)) {
             row.add_square(1.0 / variance, &mut metric);
@@ -82,7 +81,7 @@ impl Joint<'_> {
         })
     }
 
-    /// Terms of which the views do not agree that there is anything.
+    /// Terms not significantly different from zero, given the scatter of the views.
     pub fn disagreed(&self, s: &Settled, beta: &DVector<f64>, errors: &DMatrix<f64>) -> Vec<usize> {
         let counts: Vec<usize> = s.terms.iter().map(|&t| self.columns.bases[t].count()).collect();
         let is_nothing = |(t, own): (usize, Range<usize>)| {
@@ -94,7 +93,7 @@ impl Joint<'_> {
         s.terms.iter().copied().zip(spans(&counts)).filter_map(is_nothing).collect()
     }
 
-    /// The columns as planes that are faced show them.
+    /// The columns at pixels of frontal planes.
     fn seen(&self, places: &[usize], camera: &Camera, disparities: [f64; 3]) -> Vec<DesignRow> {
         let rays = camera.rays();
         let pixels = Pixels::new(camera, &rays, 1.0);
@@ -118,13 +117,14 @@ impl Joint<'_> {
     }
 }
 
-/// A covariance: the sum of the factors' outer products, and variances of each coefficient's own.
+/// A covariance: the sum of the factors' outer products, plus independent variances of the
+/// coefficients.
 pub struct Error {
     pub factors: Vec<DVector<f64>>,
     pub variances: DVector<f64>,
 }
 
-/// A place's columns that are not zero.
+/// Nonzero columns at a pixel.
 struct DesignRow(Vec<(usize, f64)>);
 
 impl DesignRow {
@@ -142,12 +142,12 @@ impl DesignRow {
     }
 }
 
-/// Of each row's value.
+/// Variance of each row's value.
 fn variances(rows: &[DesignRow], covariance: &DMatrix<f64>) -> Vec<f64> {
     rows.par_iter().map(|row| row.variance(covariance)).collect()
 }
 
-/// Variances of the first map's nodes that make what is left of every place's, neighbours being
+/// Variances of the first map's nodes that reproduce the variance left at each pixel, with neighbours
 /// independent.
 fn rest(seen: &[DesignRow], left: &DMatrix<f64>, first: usize, nodes: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); left.nrows()];
@@ -162,7 +162,7 @@ fn rest(seen: &[DesignRow], left: &DMatrix<f64>, first: usize, nodes: usize) -> 
     sums.iter().map(|(sum, n)| if *n > 0.0 { sum / n } else { 0.0 }).collect()
 }
 
-/// The largest eigenvectors of a covariance, each times the root of its eigenvalue.
+/// Leading eigenvectors of a covariance, each times the root of its eigenvalue.
 fn leading(covariance: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let n = covariance.nrows();
     if n == 0 {
@@ -192,12 +192,13 @@ fn leading(covariance: &DMatrix<f64>) -> Vec<DVector<f64>> {
     factors
 }
 
-/// What factors of `n` coefficients make of the covariance.
+/// Covariance that factors of `n` coefficients represent.
 fn together(factors: &[DVector<f64>], n: usize) -> DMatrix<f64> {
     factors.iter().fold(DMatrix::zeros(n, n), |sum, f| sum + f * f.transpose())
 }
 
-/// Covariance with the views as the sample (White 1980; Liang and Zeger 1986), where it is the larger.
+/// Covariance enlarged to the variances with the views as the sample, where these are larger (White
+/// 1980; Liang and Zeger 1986).
 pub fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64> {
     let n = beyond.len() as f64;
     let mut square = DMatrix::zeros(inverse.nrows(), inverse.nrows());
@@ -212,7 +213,7 @@ pub fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64
     })
 }
 
-/// Chance of such coefficients where there are none and the views scatter as these do (Wald 1943).
+/// Chance of such coefficients where all are zero (Wald 1943).
 fn chance_of(coefficients: &DVector<f64>, covariance: DMatrix<f64>) -> Option<f64> {
     let square = coefficients.dot(&covariance.cholesky()?.solve(coefficients));
     Some(ChiSquared::new(coefficients.len() as f64).ok()?.sf(square))
@@ -222,7 +223,7 @@ fn chance_of(coefficients: &DVector<f64>, covariance: DMatrix<f64>) -> Option<f6
 mod tests {
     use super::*;
 
-    /// Of normal numbers with the stated covariance one in ten has a chance below a tenth.
+    /// One in ten normal draws with the stated covariance has a chance below a tenth.
     #[test]
     fn the_chance_of_nothing_is_uniform() {
         let mut rng = Seed(9).stream("wald");
@@ -235,7 +236,7 @@ mod tests {
         assert_eq!(chance_of(&DVector::zeros(3), DMatrix::zeros(3, 3)), None);
     }
 
-    /// A covariance of few directions comes back whole; of many, its largest part.
+    /// A covariance of few directions is recovered whole; one of many, its largest part.
     #[test]
     fn factors_make_the_covariance_again() {
         let n = 90;
@@ -246,7 +247,7 @@ mod tests {
         assert!((made.trace() / few.trace() - 1.0).abs() < 1.0 - HELD + 1e-9);
         let none = leading(&DMatrix::identity(3, 3));
         assert_eq!(none.len(), 3);
-        // No term is left to be sure of.
+        // No term is left.
         assert_eq!(together(&leading(&DMatrix::zeros(0, 0)), 0).shape(), (0, 0));
     }
 }

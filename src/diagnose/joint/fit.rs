@@ -1,5 +1,5 @@
-//! Normal equations of terms and of a smooth map over the picture together, by parts of the views,
-//! and their penalised solution.
+//! Normal equations of terms and smooth maps together, by folds of the views, and their penalised
+//! solution.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -9,22 +9,22 @@ use crate::diagnose::search::evidence::{Evidence, score};
 use crate::diagnose::views::samples::ViewData;
 use crate::solve::Cholesky;
 
-/// Parts of the views that are left out in turn.
+/// Number of cross-validation folds of the views.
 const FOLDS: usize = 6;
 /// Precision of second differences of a map's nodes, over the mean information on a node.
 pub const SMOOTHNESS: [f64; 5] = [1.0, 0.2, 0.04, 0.008, 0.0016];
 
-/// Some views' equations of a part of the terms, with the nodes of the maps eliminated, if there are maps.
+/// Some views' equations of a subset of the terms, with the maps' nodes (if any) eliminated.
 pub struct Reduced {
     pub a: DMatrix<f64>,
     b: DVector<f64>,
-    /// The nodes where all terms are nothing, and what a term's coefficient changes of them.
+    /// Nodes where all terms are zero, and what each unit of a term's coefficient subtracts from them.
     alone: DVector<f64>,
     pub with: DMatrix<f64>,
 }
 
 impl Reduced {
-    /// Of the terms' columns in `kept`; there are `terms` of all.
+    /// Reduces to the terms' columns in `kept`, out of `terms` in all.
     pub fn of(
         all: &Evidence,
         terms: usize,
@@ -67,27 +67,27 @@ impl Reduced {
     }
 }
 
-/// The equations by parts of the views.
+/// The equations by folds of the views.
 pub struct Joint<'a> {
     pub columns: &'a Columns,
     pub data: &'a [ViewData],
     parts: Vec<Evidence>,
     pub all: Evidence,
-    /// Of either half of the views.
+    /// Equations of each half of the views.
     pub halves: [Evidence; 2],
 }
 
 impl<'a> Joint<'a> {
     pub fn of(columns: &'a Columns, data: &'a [ViewData], second: &[bool]) -> Self {
-        // Near and far in every part.
+        // Near and far views in every fold.
         let z = |v: &usize| data[*v].places.first().map_or(0.0, |p| p.rho);
         let mut order: Vec<usize> = (0..data.len()).collect();
         order.sort_by(|a, b| z(a).total_cmp(&z(b)));
         let folds = FOLDS.min(data.len());
         let views: Vec<Vec<usize>> =
             (0..folds).map(|f| order.iter().skip(f).step_by(folds).copied().collect()).collect();
-        // What each part has of either half. A view's equations are a matrix of megabytes: they are added as
-        // they come, the nearest first.
+        // Equations of each fold and half. A view's are a matrix of megabytes: they are summed as they
+        // come, the nearest first.
         let of_half = |(part, half): (usize, bool)| {
             let mine = views[part].iter().filter(|v| second[**v] == half);
             columns.evidence(mine.map(|&v| &data[v]))
@@ -102,12 +102,12 @@ impl<'a> Joint<'a> {
         Joint { columns, data, parts, all, halves }
     }
 
-    /// What each view of these says beyond a fit, its plane profiled out: the score that is left.
+    /// Scores that a fit leaves in these views, their planes profiled out.
     pub fn left(&self, views: &[usize], beta: &DVector<f64>) -> Vec<DVector<f64>> {
         views.par_iter().filter_map(|&v| self.columns.left(&self.data[v], beta)).collect()
     }
 
-    /// Fits of these terms without each part.
+    /// Reduced equations of these terms without each fold in turn.
     pub fn without(&self, terms: &[usize], penalty: Option<&DMatrix<f64>>) -> Option<Vec<Reduced>> {
         let kept = self.kept(terms);
         let of = |part: &Evidence| {
@@ -121,7 +121,8 @@ impl<'a> Joint<'a> {
         terms.iter().flat_map(|&t| self.columns.span(t)).collect()
     }
 
-    /// Nats over no term at all on each part left out; only what `applied` says of a term is taken.
+    /// Gain over no term at all on each left-out fold, nats, counting only the terms that `applied`
+    /// selects.
     pub fn scores(
         &self,
         without: &[Reduced],

@@ -1,11 +1,10 @@
-//! The joint posterior of all that shifts the mean.
+//! Joint posterior of everything that shifts the mean.
 //!
-//! The search takes the best term first, and what it takes next makes up for what that one got
-//! wrong. Here the terms it settled on are fitted together once more, each held by what is usual of
-//! its kind, and with them a smooth rest: two maps over the picture, one of them times the square
-//! of the disparity. Every view's plane is free, and what planes absorb of a shape is taken out of
-//! it beforehand. How smooth the maps are, and whether they and the terms are needed, is decided on
-//! views left out.
+//! The search takes the best term first, and later terms make up for its errors. Here the terms found
+//! are refitted jointly, each with a prior on its usual size, together with a smooth remainder: two
+//! maps over the image, one of them times the square of the disparity. Every view's plane is free, and
+//! what planes absorb of a shape is subtracted beforehand. Left-out views decide how smooth the maps
+//! are, and whether they and the terms are needed.
 
 pub mod anchor;
 mod columns;
@@ -29,10 +28,10 @@ use error::{Error, clustered};
 use fit::{Joint, Reduced};
 use terms::{Settled, System, is_rough, total};
 
-/// The terms of a finished search fitted together, with the smooth rest. `fine` are the views' means
-/// in small patches, `inflation` what each view's weights were divided by: a bias is as sure in a
-/// view as in another, for views scatter beyond their noise. `second` says which half a view is in;
-/// where all are in one, nobody asks how sure it is, and there are neither halves nor a covariance.
+/// Refits the terms of a finished search jointly, with the smooth remainder. `fine` are the views'
+/// means in small patches. `inflation` is what each view's weights were divided by; it is replaced by
+/// its median, because views scatter beyond their noise and a bias is equally certain in all. `second`
+/// says which half a view is in; if all are in one half, halves and covariance are not computed.
 pub fn refit(
     fine: &[ViewData],
     inflation: &[f64],
@@ -50,7 +49,7 @@ pub fn refit(
         .zip(inflation)
         .map(|(view, own)| {
             let mut view = if rough { view.clone() } else { coarser(view, COARSE_PX) };
-            // A target too small to measure its noise on weighs nothing already.
+            // A target too small to measure its noise on has no weight already.
             let share = if own.is_finite() { own / common } else { 0.0 };
             view.weight.iter_mut().for_each(|w| *w *= share);
             view
@@ -82,7 +81,7 @@ impl Joint<'_> {
         let kept = self.kept(&s.terms);
         let whole = Reduced::of(&self.all, self.columns.terms, &kept, s.penalty.as_ref())?;
         let first = whole.fit(&kept, &self.columns.precision)?;
-        // What every view says beyond the common fit, of all and of the terms alone.
+        // Scores that the common fit leaves in each view, of all columns and of the terms alone.
         let every: Vec<usize> = (0..self.data.len()).collect();
         let left = self.left(&every, &first);
         let of_terms = |left: &DVector<f64>| {
@@ -102,7 +101,7 @@ impl Joint<'_> {
         let inverse = held(1.0)?;
         let free = (&information * &inverse).trace();
         let scatter: f64 = beyond.iter().map(|e| e.dot(&(&inverse * e))).sum();
-        // Views scatter beyond their noise: what they say counts for less against what is usual.
+        // Views scatter beyond their noise, so their evidence counts less against the prior.
         let dispersion = if kept.is_empty() { 1.0 } else { (scatter / free).max(1.0) };
         let precision = &self.columns.precision * dispersion;
         let beta = whole.fit(&kept, &precision)?;
@@ -132,7 +131,7 @@ impl Joint<'_> {
         })
     }
 
-    /// An error where [`Joint::reported`] has the coefficients.
+    /// An error laid out like the coefficients of [`Joint::reported`].
     fn reported_error(&self, s: &Settled, error: &Error) -> Covariance {
         Covariance {
             factors: error.factors.iter().map(|f| self.reported(s, f)).collect(),
@@ -141,7 +140,7 @@ impl Joint<'_> {
         }
     }
 
-    /// The terms' covariance where [`Joint::reported`] has their coefficients, zero elsewhere.
+    /// The terms' covariance, laid out like the coefficients of [`Joint::reported`]; zero elsewhere.
     fn covariance_of_reported(
         &self,
         s: &Settled,
@@ -168,7 +167,7 @@ impl Joint<'_> {
         covariance
     }
 
-    /// The same fit to either half of the views, where there are two.
+    /// Fits the same system to each half of the views, where there are two.
     fn halves(
         &self,
         second: &[bool],
@@ -196,7 +195,7 @@ impl Joint<'_> {
         let mut counts = Vec::new();
         for &t in &s.terms {
             counts.push(self.columns.bases[t].count());
-            // What planes absorb goes with its term.
+            // The part that planes absorb belongs to its term.
             counts.extend(self.columns.gauges[t].is_some().then_some(0));
         }
         if s.penalty.is_some() {
@@ -211,7 +210,8 @@ impl Joint<'_> {
         })
     }
 
-    /// The terms with what planes absorb of each, and the maps. What the views do not agree on at all has no name.
+    /// The terms, each with the part that planes absorb, and the maps. A term that the views disagree
+    /// on entirely loses its name.
     fn chosen(&self, s: &Settled, found: &Outcome, disagreed: &[usize]) -> Vec<Chosen> {
         let mut chosen = Vec::new();
         for &t in &s.terms {
@@ -247,7 +247,8 @@ impl Joint<'_> {
         self.laid_out(s, beta, |gauge, mine| gauge.term(mine).1)
     }
 
-    /// A number for each coefficient of [`Joint::chosen`]; `affine` has those of what planes absorb.
+    /// Lays out one number per coefficient of [`Joint::chosen`]; `affine` gives those of the parts that
+    /// planes absorb.
     fn laid_out(
         &self,
         s: &Settled,
@@ -273,7 +274,7 @@ impl Joint<'_> {
     }
 }
 
-/// Near, in the middle, and far, px: a tenth, half and nine tenths of the views' samples.
+/// Far, middle and near disparities, px: the 10 %, 50 % and 90 % quantiles of the views' samples.
 fn disparities(data: &[ViewData]) -> [f64; 3] {
     let mut all: Vec<f64> =
         data.iter().flat_map(|v| v.places.iter().map(|p| p.disparity)).collect();

@@ -1,4 +1,4 @@
-//! Which terms the joint fit keeps, and whether it has a smooth rest: by what views left out say.
+//! Decides on left-out views which terms the joint fit keeps, and whether it has smooth maps.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,45 +10,44 @@ use crate::diagnose::views::samples::COARSE_PX;
 use crate::stats::student_upper;
 use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 
-/// Maps take the place of terms where they predict views left out better by this share, and by so
-/// many standard errors over the parts.
+/// Maps replace terms if they predict left-out views better by this share and by so many standard
+/// errors over the folds.
 const MAPS_SHARE: f64 = 0.02;
 const MAPS_CLEARLY: f64 = 3.0;
-/// Beside the maps a term must bring this share of all, and be so clear. Of waves, to which maps only come
-/// near, being clear is enough.
+/// Share of the total gain that a term must bring beside the maps, and by how many standard errors. For
+/// waves, which maps only approximate, the latter is enough.
 const TERM_SHARE: f64 = 0.005;
 const TERM_CLEARLY: f64 = 2.0;
-/// A shape of the target, which a correction leaves in, must bring as much beside the maps as they
-/// must bring themselves, and lie within so many of the standard deviations of what is usual (95 % of
-/// them do): what is collinear with the sensor's own error and fits no board is not the board's.
+/// Largest size of a target shape beside the maps, in prior standard deviations (95 % lie within). Such
+/// a shape, which a correction leaves in, must also bring `MAPS_SHARE`. One that is collinear with the
+/// sensor's own error and fits no board is not the board's.
 const LARGEST_USUAL: f64 = 2.0;
-/// A smooth error of the sensor, the maps among them, must bring this share beside a shape of the
-/// target: less is what the target's formula misses (up to 2.1 % of domes, 0.7 % of arcs), and no
-/// board's misfit is to be taken out of other pictures.
+/// Share of the total gain that a smooth sensor error, such as the maps, must bring beside a target
+/// shape. Less is a misfit of the target's formula (up to 2.1 % for domes, 0.7 % for arcs), which must
+/// not be subtracted from other images.
 const BESIDE_TARGET: f64 = 0.05;
-/// A radial name that explains this share of all stands, and the maps are the rest of it.
+/// Share of the total gain from which a radial name stays, with the maps as its remainder.
 const RADIAL_NAME_ADEQUATE: f64 = 0.6;
 
-/// What the terms are in the end.
+/// The terms and maps that are kept.
 pub struct Settled {
     pub terms: Vec<usize>,
     pub penalty: Option<DMatrix<f64>>,
     pub without: Vec<Reduced>,
     pub scores: Vec<f64>,
-    /// What the maps bring beside the terms, nats, and the chance that nothing brings as much: over
-    /// the parts left out, by Student's t.
+    /// Gain of the maps beside the terms, nats, and its p-value by Student's t over the folds.
     pub maps: f64,
     pub maps_p: f64,
 }
 
-/// What is solved: the columns that are in it, by number, and what holds them.
+/// A system to solve: the indices of its columns, and their prior precision.
 pub struct System {
     pub columns: Vec<usize>,
     pub held: DMatrix<f64>,
 }
 
 impl Joint<'_> {
-    /// The terms' columns in `kept`, and the maps' where there are maps.
+    /// System of the terms' columns in `kept`, and of the maps' where there are maps.
     pub fn system(&self, s: &Settled, kept: &[usize], precision: &DVector<f64>) -> System {
         let terms = self.columns.terms;
         let nodes = if s.penalty.is_some() { self.columns.nodes } else { 0 };
@@ -79,7 +78,7 @@ impl Joint<'_> {
             let better = total(&mapped.scores) - total(&settled.scores);
             let slack = MAPS_SHARE * total(&mapped.scores);
             let clear = behind(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
-            // A rest that the search saw is told by the maps, unless they are the worse for it.
+            // A remainder found by the search is left to the maps, unless they are worse.
             let seen = kept.len() < settled.terms.len();
             let alone = self.scores(&settled.without, &kept, |_| true);
             let brought = total(&mapped.scores) - total(&alone);
@@ -101,8 +100,8 @@ impl Joint<'_> {
         Some(settled)
     }
 
-    /// The smoothest maps that predict the parts left out within a standard error of the best
-    /// (Breiman et al. 1984).
+    /// Smoothest maps that predict the left-out folds within one standard error of the best (Breiman et
+    /// al. 1984).
     fn best_maps(&self, terms: &[usize]) -> Option<Settled> {
         let first = self.columns.terms;
         let diagonal = self.all.a.diagonal();
@@ -123,7 +122,7 @@ impl Joint<'_> {
         all.into_iter().find(|s| behind(&best, &s.scores) < 1.0)
     }
 
-    /// Terms that the maps make needless. The terms `alone` bring so much without them, nats.
+    /// Drops terms that the maps make redundant. `alone` is the terms' gain without the maps, nats.
     fn drop_idle(&self, settled: &mut Settled, chosen: &[Chosen], alone: f64) {
         let concerned = |s: &Settled, t: usize| {
             let c = &chosen[t].candidate;
@@ -146,7 +145,7 @@ impl Joint<'_> {
         self.drop_while(settled, concerned, needless);
     }
 
-    /// What is smooth over the picture and brings little beside a shape of the target.
+    /// Drops smooth sensor errors that bring little beside a target shape.
     fn drop_misfit_of_target(&self, settled: &mut Settled, chosen: &[Chosen]) {
         if settled.terms.iter().all(|&t| is_of_sensor(&chosen[t].candidate)) {
             return;
@@ -159,8 +158,8 @@ impl Joint<'_> {
         self.drop_while(settled, concerned, brings_less_than(BESIDE_TARGET));
     }
 
-    /// Nameless curves that bring next to nothing beside a name on their own axis: of columns that
-    /// nearly say the same a fit makes two halves.
+    /// Drops nameless curves that bring next to nothing beside a name on their own axis: a fit would
+    /// split the effect between nearly collinear columns.
     fn drop_companions(&self, settled: &mut Settled, chosen: &[Chosen]) {
         let named: Vec<Axis> = settled
             .terms
@@ -176,8 +175,8 @@ impl Joint<'_> {
         self.drop_while(settled, concerned, brings_less_than(TERM_SHARE));
     }
 
-    /// Leave out terms among the `concerned` that are `needless`, the one that is missed least first: by
-    /// what the parts left out lose without it, nats, and by their scores then.
+    /// Drops terms among the `concerned` that are `needless`, least missed first. `needless` gets the
+    /// gain that the left-out folds lose without the term, nats, and their scores without it.
     fn drop_while(
         &self,
         settled: &mut Settled,
@@ -203,7 +202,7 @@ impl Joint<'_> {
         }
     }
 
-    /// The largest of a term's coefficients over its usual size, mean over the fits.
+    /// Largest of a term's coefficients in prior standard deviations, averaged over the fits.
     fn size(&self, settled: &Settled, term: usize) -> f64 {
         let kept = self.kept(&settled.terms);
         let span = self.columns.span(term);
@@ -216,8 +215,8 @@ impl Joint<'_> {
         fits.map(of).sum::<f64>() / settled.without.len().max(1) as f64
     }
 
-    /// What a correction takes out must help the parts left out; terms that are needed for the sum
-    /// alone, against one that is not the sensor's, do not.
+    /// Drops terms until the sensor's alone, which a correction subtracts, help the left-out folds. A
+    /// term needed only to offset one that is not the sensor's does not help.
     fn drop_harmful(&self, settled: &mut Settled, chosen: &[Chosen]) {
         let of_sensor = |t: usize| is_of_sensor(&chosen[t].candidate);
         while !settled.terms.is_empty() {
@@ -241,7 +240,7 @@ fn without(terms: &[usize], term: usize) -> Vec<usize> {
     terms.iter().copied().filter(|t| *t != term).collect()
 }
 
-/// Needless is a term without which the parts left out lose less than this share.
+/// Criterion for dropping a term: the left-out folds lose less than this share without it.
 fn brings_less_than(share: f64) -> impl Fn(&Settled, usize, f64, &[f64]) -> bool {
     move |settled, _, lost, _| lost < share * total(&settled.scores)
 }
@@ -250,7 +249,7 @@ pub fn total(scores: &[f64]) -> f64 {
     scores.iter().sum()
 }
 
-/// Do the maps say the same, and more?
+/// Whether the maps can express the same, and more.
 pub fn is_smooth_and_nameless(c: &Candidate) -> bool {
     let still = matches!(
         c.basis,
@@ -263,12 +262,12 @@ fn is_radial_name(c: &Candidate) -> bool {
     c.family.is_some() && c.basis.axis() == Axis::Radius
 }
 
-/// From so many nodes on no smooth map stands in for lines.
+/// Number of nodes from which a curve over columns or rows is too fine for a smooth map.
 const FINE_LINES: usize = 30;
-/// Nodes that are nearer than so many larger patches are not told apart by these.
+/// Smallest node spacing that larger patches resolve, in patches.
 const PATCHES_A_NODE: f64 = 2.0;
 
-/// Too rough for a smooth map to stand in for it, or for larger patches to show it?
+/// Whether it is too rough for a smooth map to replace it, or for larger patches to show it.
 pub fn is_rough(c: &Candidate) -> bool {
     let changes_within_a_patch = match c.basis {
         Basis::Curve { over: Coordinate::Column | Coordinate::Row, low, high, nodes, .. } => {

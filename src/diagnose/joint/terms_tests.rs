@@ -28,7 +28,7 @@ fn a_bowl_alone_needs_no_maps_and_keeps_its_size() {
     assert!((k - 0.3).abs() < 0.01, "{k}");
 }
 
-/// A wave and a curve over the same columns: the wave says it all, and keeps its size.
+/// A wave and a curve over the same columns: the wave explains it all, and keeps its size.
 #[test]
 fn a_nameless_curve_does_not_share_what_a_name_says() {
     let period_px = 20.0;
@@ -48,7 +48,7 @@ fn a_nameless_curve_does_not_share_what_a_name_says() {
     assert!((height - 0.1).abs() < 0.01, "{height}");
 }
 
-/// Waves that come near to what is smooth are none; of teeth the maps leave too much.
+/// Waves that only approximate a smooth shape are dropped; a sawtooth leaves the maps too much.
 #[test]
 fn waves_are_told_beside_the_maps_where_they_are_clear() {
     let waves = |period| term(Some("column-banding"), Basis::waves(Coordinate::Column, period, 2));

@@ -1,4 +1,4 @@
-//! Simulated views of planes: what goes in comes out, and nothing else.
+//! Simulated views of planes: injected biases are recovered, and nothing else.
 
 use std::sync::Arc;
 
@@ -76,8 +76,8 @@ pub(super) fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {
     refit(data, &vec![1.0; data.len()], &second, &kinect_v1(4).camera, found)
 }
 
-/// Root mean square of the bias around each view's plane, before and after what the sensor's terms
-/// say, px.
+/// Root mean square of the bias about each view's plane, before and after subtracting the sensor's
+/// terms, px.
 pub(super) fn left(data: &[ViewData], outcome: &Outcome) -> [f64; 2] {
     let (mut squares, mut n) = ([0.0; 2], 0.0);
     let terms = terms_of(outcome, Statistic::Bias);
@@ -112,7 +112,7 @@ pub(super) fn smooth(p: &PixelContext) -> f64 {
     0.15 * (p.u / 25.0).sin() * (p.v / 20.0).cos()
 }
 
-/// No fit to planes tells it, so it is nothing.
+/// No fit to planes determines it, so it is zero.
 #[test]
 fn what_planes_absorb_comes_out_as_nothing() {
     let rng = &mut Seed(5).stream("joint/affine");
@@ -124,8 +124,8 @@ fn what_planes_absorb_comes_out_as_nothing() {
     assert!(most < 0.05, "{most}");
 }
 
-/// A slope that grows with the disparity's square bends tilted planes. It is no part of what is told,
-/// and nothing else is told in its place.
+/// A slope that grows with the disparity's square bends tilted planes. It is not reported, and nothing
+/// else is reported in its place.
 #[test]
 fn a_slope_of_the_disparity_squared_is_left_out_and_bends_no_map() {
     let far = |p: &PixelContext| (p.disparity / 40.0).powi(2);
@@ -152,7 +152,7 @@ fn a_slope_of_the_disparity_squared_is_left_out_and_bends_no_map() {
     assert!(missed < 0.1 * size, "{missed} of {size}");
 }
 
-/// Near views teach nothing of what grows far away; what they teach must not do harm there.
+/// Near views say nothing of what grows far away; their correction must not do harm there.
 #[test]
 fn a_correction_from_one_distance_does_no_harm_at_another() {
     for seed in 0..3 {
@@ -167,11 +167,11 @@ fn a_correction_from_one_distance_does_no_harm_at_another() {
     }
 }
 
-/// The stated error of the sum against the true one, over seeds and places: its square is one on
-/// average, give or take the few directions that a fit has, and nine tenths lie within 1.645.
+/// The stated error of the sum against the true one, over seeds and places: the squared ratio is one on
+/// average, give or take the few degrees of freedom of a fit, and nine tenths lie within 1.645.
 #[test]
 fn the_stated_error_is_the_true_one() {
-    // What the maps can bend to: what is finer is no part of a stated error.
+    // Smooth enough for the maps: finer shapes are no part of a stated error.
     let wide = |p: &PixelContext| 0.15 * (p.u / 70.0).sin() * (p.v / 60.0).cos();
     let bias = |p: &PixelContext| 0.3 * p.radius.powi(2) + wide(p);
     let (mut squares, mut inside, mut n) = (0.0, 0.0, 0.0);
@@ -189,7 +189,7 @@ fn the_stated_error_is_the_true_one() {
             total
         };
         let beta = outcome.fit.as_ref().expect("a fit").beta.clone();
-        // A frontal plane at 1.2 m, what planes absorb taken out of the error.
+        // A frontal plane at 1.2 m, with what planes absorb subtracted from the error.
         let view = &data[0];
         let places: Vec<PixelContext> = view
             .places
@@ -219,7 +219,7 @@ fn the_stated_error_is_the_true_one() {
     assert!((0.75..=0.99).contains(&(inside / n)), "{}", inside / n);
 }
 
-/// What is left of a view by one pass over its samples is what its normal equations leave.
+/// The score left in a view by one pass over its samples is that of its normal equations.
 #[test]
 fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
     let mut rng = Seed(5).stream("joint/left");
@@ -232,7 +232,7 @@ fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
     let [inverse, square] = [-1.0, 2.0].map(|power| curve(Modulation::still(power)));
     let chosen = [bowl, square.clone(), inverse, square].map(|basis| term(None, basis));
     let columns = Columns::of(&chosen, &kinect_v1(4).camera, 1.0);
-    // What planes absorb is taken out of the sums, or of every row.
+    // What planes absorb is subtracted from the sums, or from every row.
     let fill = |i: usize, row: &mut [f64]| columns.fill(&data[5].places[i], row);
     let rows = data[5].rows(&data[5].response).unwrap();
     let gauged = rows.reduce(columns.terms + columns.nodes, fill);
@@ -257,8 +257,8 @@ fn what_is_left_of_a_view_is_its_score_less_what_the_fit_takes() {
     }
 }
 
-/// A curve with a node to every other column can say all that bands can: it is their rest, and takes
-/// neither their size nor their name.
+/// A curve with a node to every other column can express all that bands can: it completes them, and
+/// takes neither their size nor their name.
 #[test]
 fn a_curve_beside_bands_is_their_rest() {
     const PERIOD_PX: f64 = 23.0;

@@ -1,4 +1,4 @@
-//! What share of a patch was lost, and how much such shares scatter without any cause.
+//! Share lost in each patch, and how much such shares scatter without a cause.
 
 use std::collections::BTreeMap;
 
@@ -18,11 +18,11 @@ pub struct Cell<'a> {
     pub place: &'a PixelContext,
     pub lost: f64,
     pub asked: f64,
-    /// It is held against a twin, and it, a neighbour or one of their twins loses something.
+    /// Whether it is compared with a twin and it, a neighbour or one of their twins loses something.
     pub differs: bool,
 }
 
-/// A patch of many tiles, with a place of its own.
+/// A patch of many tiles, with its own place.
 #[derive(Debug, Clone, Copy)]
 pub struct Patch {
     pub place: PixelContext,
@@ -30,7 +30,7 @@ pub struct Patch {
     pub asked: f64,
 }
 
-/// The patches as cells.
+/// Converts the patches to cells.
 pub fn cells(patches: &[Vec<Patch>]) -> Vec<Vec<Cell<'_>>> {
     fn cell(p: &Patch) -> Cell<'_> {
         Cell { place: &p.place, lost: p.lost, asked: p.asked, differs: false }
@@ -38,12 +38,12 @@ pub fn cells(patches: &[Vec<Patch>]) -> Vec<Vec<Cell<'_>>> {
     patches.iter().map(|view| view.iter().map(cell).collect()).collect()
 }
 
-/// Cells across the picture: some hundred a view, each wider than a clump of dead pixels.
+/// Cells across the picture: about a hundred a view, each wider than a clump of dead pixels.
 const ACROSS: usize = 16;
-/// A smaller patch, in tiles, says little.
+/// Fewest tiles of a patch that is used.
 const MIN_TILES: usize = 2;
 
-/// All views in patches large enough to judge.
+/// Patches of all views, large enough to judge.
 pub fn patches(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<Patch>> {
     let side = (camera.width.div_ceil(ACROSS * SIDE) * SIDE) as f64;
     let rim = rim_px(camera);
@@ -68,14 +68,14 @@ pub fn patches(survey: &Survey, camera: &Camera, margins: &Margins) -> Vec<Vec<P
     survey.views.iter().map(of_view).collect()
 }
 
-/// Which cell of its picture it is.
+/// Row, column and rim flag of a cell.
 fn key(cell: &Cell<'_>, rim: f64) -> (u32, u32, bool) {
     let at = |x: f64| (x / cell.place.side) as u32;
     (at(cell.place.v), at(cell.place.u), cell.place.edge < rim)
 }
 
-/// What is lost at the same places of the views' twins, in log odds over nothing lost. Cells without a twin
-/// show nothing and go.
+/// Log odds of the losses at the same places of the twins, above those of no loss. Drops cells without a
+/// twin.
 pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) -> Vec<Vec<f64>> {
     let of_view = |(mine, theirs): (&mut Vec<Cell<'_>>, &Vec<Cell<'_>>)| {
         let lost: BTreeMap<_, f64> =
@@ -84,7 +84,7 @@ pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) 
         let expected: Vec<f64> = mine.iter().map(|c| lost[&key(c, rim)]).collect();
         let loses: Vec<bool> =
             mine.iter().zip(&expected).map(|(c, e)| c.lost > 0.0 || *e > 0.0).collect();
-        // Where a clump lies in one run, the other could have had it next to it.
+        // A clump seen in one run could have lain next to it in the other.
         let differs: Vec<bool> = (0..mine.len())
             .map(|i| (0..mine.len()).any(|j| loses[j] && touch(&mine[i], &mine[j])))
             .collect();
@@ -94,7 +94,7 @@ pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) 
     cells.iter_mut().zip(twins).map(of_view).collect()
 }
 
-/// Every tile a cell of its own: for where and how much, not for whether.
+/// Every tile as a cell, to locate and size losses, not to detect them.
 pub fn fine<'a>(survey: &'a Survey, margins: &Margins) -> Vec<Vec<Cell<'a>>> {
     let of_view = |v: &'a SurveyedView| {
         let held = v.patches().filter(|(place, _)| margins.hold(place));
@@ -107,15 +107,15 @@ pub fn fine<'a>(survey: &'a Survey, margins: &Margins) -> Vec<Vec<Cell<'a>>> {
     survey.views.iter().map(of_view).collect()
 }
 
-/// Losses below this share are all the same.
+/// Losses below this share are indistinguishable.
 const HARDLY: f64 = 0.002;
 
-/// Log odds of a share, flattened where hardly anything or nearly all is lost.
+/// Log odds of a share, flattened near 0 and 1.
 pub fn odds(share: f64) -> f64 {
     ((share + HARDLY) / (1.0 - share + HARDLY)).ln()
 }
 
-/// Its inverse.
+/// Inverse of [`odds`].
 pub fn share(odds: f64) -> f64 {
     let e = odds.exp();
     (((1.0 + HARDLY) * e - HARDLY) / (1.0 + e)).clamp(0.0, 1.0)
@@ -124,28 +124,28 @@ pub fn share(odds: f64) -> f64 {
 /// Variances of the log odds without a cause.
 #[derive(Debug, Clone, Copy)]
 pub struct Scatter {
-    /// Of a view as a whole.
+    /// Of a view's level.
     pub level: f64,
-    /// Of a view's slope across the picture, for a normalised coordinate of 1.
+    /// Of a view's slope across the picture, per unit of normalised coordinate.
     pub slope: f64,
     /// Of a cell.
     pub cell: f64,
-    /// Of one that is held against a twin where either, or a neighbour, loses something: clumps lie
-    /// elsewhere in every run, and where neither loses anything nothing scatters.
+    /// Of a cell compared with a twin where either, or a neighbour, loses something. Clumps lie elsewhere in
+    /// every run, and where neither loses anything there is no scatter.
     pub differing: f64,
-    /// Neighbouring cells share their clumps: so many make one.
+    /// Number of neighbouring cells that share a clump and so count as one.
     pub clump: f64,
 }
 
-/// Before anything is measured: views differ by a factor of e, the sides of one picture as well.
+/// Scatter before anything is measured: views differ by a factor of e, and so do the sides of a picture.
 pub const USUAL: Scatter =
     Scatter { level: 1.0, slope: 4.0, cell: 0.5, differing: 0.5, clump: 4.0 };
-/// Never believed to be less.
+/// Lower bound on an estimated scatter.
 pub const MIN_SCATTER: Scatter =
     Scatter { level: 0.1, slope: 0.4, cell: 0.1, differing: 0.1, clump: 1.0 };
-/// What a few views show is taken so much larger.
+/// A scatter estimated from n views is enlarged by 1 + `FEW` / n.
 pub const FEW: f64 = 4.0;
-/// Cells nearer than this are neighbours, in their sides: the corners too.
+/// Cells closer than this many sides are neighbours, including diagonal ones.
 const APART: f64 = 1.5;
 
 /// Applies the inverse covariance of a view's cells.
@@ -167,25 +167,25 @@ impl Whitener {
             .iter()
             .zip(&weights)
             .fold(Matrix3::from_diagonal(&tight), |m, (n, w)| m + n * n.transpose() * *w);
-        // Positive definite by its diagonal.
+        // Positive definite thanks to its diagonal.
         let inverse = inner.try_inverse().unwrap_or_else(Matrix3::zeros);
         Whitener { weights, slopes, inverse, scatter }
     }
 
-    /// C^-1 y by Woodbury's identity.
+    /// Returns C^-1 y by the Woodbury identity.
     pub fn solve(&self, y: &[f64]) -> Vec<f64> {
         let own = self.own(y);
         let left = self.slopes.iter().zip(y).map(|(n, y)| y - n.dot(&own));
         left.zip(&self.weights).map(|(left, w)| w * left).collect()
     }
 
-    /// The view's level and slopes.
+    /// Estimates the view's level and slopes.
     fn own(&self, y: &[f64]) -> Vector3<f64> {
         let cells = self.slopes.iter().zip(&self.weights).zip(y);
         self.inverse * cells.fold(Vector3::zeros(), |s, ((n, w), y)| s + n * (*w * *y))
     }
 
-    /// Log odds of a view in which nothing is wrong.
+    /// Draws log odds of a view without an effect.
     pub fn draw(&self, mut normal: impl FnMut() -> f64) -> Vec<f64> {
         let s = &self.scatter;
         let own = Vector3::new(
@@ -199,8 +199,8 @@ impl Whitener {
 }
 
 impl Scatter {
-    /// What is left of the views' log odds, and no less than `min`: their levels and slopes by least
-    /// squares, then the cells about them.
+    /// Scatter of the log odds `left`, at least `min`: the views' levels and slopes by least squares, then
+    /// the cells about them.
     pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], min: Scatter) -> Self {
         let (mut sums, mut n) = ([0.0; 4], [0.0; 4]);
         let mut neighbours = Neighbours::default();
@@ -231,13 +231,13 @@ impl Scatter {
     }
 }
 
-/// Are they neighbours, or one patch's rim and its other part?
+/// Whether two cells are neighbours, or the rim and the rest of one patch.
 fn touch(a: &Cell, b: &Cell) -> bool {
     let side = a.place.side.max(b.place.side).max(1.0);
     (a.place.u - b.place.u).hypot(a.place.v - b.place.v) < APART * side
 }
 
-/// How much neighbouring cells have in common.
+/// How strongly neighbouring cells correlate.
 #[derive(Default)]
 pub struct Neighbours {
     product: f64,
@@ -247,7 +247,7 @@ pub struct Neighbours {
 }
 
 impl Neighbours {
-    /// Every pair of cells that touch, counted once; a rim's cell and its patch's other part among them.
+    /// Adds every pair of touching cells once, including a patch's rim and its other part.
     fn add(&mut self, cells: &[Cell], off: &[f64]) {
         for (i, (a, x)) in cells.iter().zip(off).enumerate() {
             self.square += x * x;
@@ -261,7 +261,7 @@ impl Neighbours {
         }
     }
 
-    /// The same for many cells, by their columns and rows.
+    /// Same for many cells, by column and row.
     pub fn add_grid(&mut self, off: &BTreeMap<(i64, i64), f64>) {
         for ((u, v), x) in off {
             self.square += x * x;
@@ -275,13 +275,13 @@ impl Neighbours {
         }
     }
 
-    /// Further cells that a cell is one with: of four neighbours and four at the corners.
+    /// Number of further cells that a cell is one with, of its eight neighbours.
     pub fn more(&self) -> f64 {
         let rho = self.product / self.pairs.max(1.0) * self.cells / self.square.max(1e-12);
         8.0 * rho.clamp(0.0, 1.0)
     }
 
-    /// Cells that make one.
+    /// Cells that count as one.
     fn size(&self) -> f64 {
         1.0 + self.more()
     }

@@ -1,4 +1,4 @@
-//! How many readings are lost together.
+//! Number of readings that are lost together.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use crate::stats::range;
 /// Parts of a view's reach along an axis.
 pub const PARTS: usize = 64;
 
-/// The part of a view's reach that each cell lies in.
+/// Index of the part of the view's reach that each cell lies in.
 pub fn parts(cells: &[Cell<'_>], at: &dyn Fn(&Cell<'_>) -> f64) -> Vec<usize> {
     let span = range(cells.iter().map(at));
     cells.iter().map(|c| part(at(c), span, PARTS)).collect()
 }
 
-/// Pixel-frames that are lost together: how much more patches scatter than single losses would about a share
-/// that grows with `along` within each view, times how many of them are alike.
+/// Number of pixel-frames that are lost together: the overdispersion of the patches' losses about a share
+/// that grows with `along` within each view, times the number of patches that are alike.
 pub fn clump(views: &[Vec<Cell<'_>>], along: &dyn Fn(&Cell<'_>) -> f64) -> f64 {
     let (mut neighbours, mut expected) = (Neighbours::default(), 0.0);
     for view in views.iter().filter(|v| v.iter().any(|c| c.lost > 0.0)) {
@@ -30,12 +30,12 @@ pub fn clump(views: &[Vec<Cell<'_>>], along: &dyn Fn(&Cell<'_>) -> f64) -> f64 {
         neighbours.add_grid(&off);
     }
     let together = (neighbours.square / f64::max(expected, f64::MIN_POSITIVE)).max(1.0);
-    // Where losses are single, patches are alike for what the share leaves out.
+    // Where losses are single, neighbours are alike only in what the share misses.
     together * (1.0 + neighbours.more() * (1.0 - 1.0 / together))
 }
 
-/// Of each cell the share that is lost, by least squares among those that only grow (pooling of adjacent
-/// violators: Ayer et al. 1955).
+/// Share lost in each cell: the non-decreasing least-squares fit along the axis (pool adjacent violators,
+/// Ayer et al. 1955).
 fn growing_share(view: &[Cell<'_>], along: &dyn Fn(&Cell<'_>) -> f64) -> Vec<f64> {
     let parts = parts(view, along);
     let mut sums = [[0.0; 2]; PARTS];
@@ -72,7 +72,7 @@ mod tests {
     const ACROSS: usize = 40;
     const FRAMES: usize = 4;
 
-    /// Patches of a picture in which each reading is lost by a chance, and of some pixels all.
+    /// Patches of a picture in which each reading is lost with a `chance`, and all of a `dead` pixel's.
     fn view(chance: impl Fn(f64) -> f64, dead: impl Fn(usize, usize) -> bool) -> Vec<Patch> {
         let mut rng = Seed(3).stream("clumps");
         let mut patches = Vec::new();
@@ -91,7 +91,7 @@ mod tests {
         patches
     }
 
-    /// What follows the axis is single, a dead pixel is lost in all frames, and a hole is one event.
+    /// Losses that follow the axis are single, a dead pixel is lost in all frames, and a hole is one event.
     #[test]
     fn single_losses_are_single_however_they_rise_along_the_axis() {
         let along = |sign: f64, view: &[Patch]| {

@@ -1,24 +1,24 @@
-//! What the views lose, patch by patch.
+//! Losses of the views, patch by patch.
 
 use super::cells::Cell;
 use super::hard_end::HardEnd;
 
-/// The views' losses on the target.
+/// Losses of the views on the target.
 pub struct DropoutCells<'a> {
-    /// In patches large enough to judge.
+    /// Patches large enough to judge.
     pub cells: Vec<Vec<Cell<'a>>>,
-    /// In the smallest there are.
+    /// Smallest patches.
     pub fine: Vec<Vec<Cell<'a>>>,
     /// Whether a view's region was given.
     pub region_given: Vec<bool>,
-    /// Whether it is in the second half.
+    /// Whether each view is in the second half.
     pub second: Vec<bool>,
-    /// Log odds that the views' twins lose in each patch, over nothing lost.
+    /// Log odds of the twins' losses in each patch, above those of no loss.
     pub expected: Option<Vec<Vec<f64>>>,
 }
 
 impl<'a> DropoutCells<'a> {
-    /// Without the patches that a hard end of the range touches.
+    /// Copy without the patches that a hard end of the range touches.
     pub fn inside(&self, end: &HardEnd) -> DropoutCells<'a> {
         fn kept<T: Clone>(of: &[Vec<T>], cells: &[Vec<Cell<'_>>], end: &HardEnd) -> Vec<Vec<T>> {
             let inside = |(of, cells): (&Vec<T>, &Vec<Cell<'_>>)| {

@@ -1,11 +1,10 @@
-//! Losses too few to be a share of a patch: what a view has lost in all, against how steep or how far it
-//! is seen.
+//! Losses too few to form a share of a patch: a view's total loss against how steeply or how far away it sees
+//! the target.
 //!
-//! In most recordings nearly nothing is lost but in the steepest or the farthest view, where a rise
-//! has its foot: some hundred pixels of millions. A view is one sample. The logarithm of what it loses
-//! differs from the others' for no reason by as much as theirs do, and never by less than a factor
-//! of e; a count has an error of its own beside that, and what is lost in one clump counts once. Where in a
-//! view it is lost tells the rise in distance from that in tilt.
+//! In most recordings almost nothing is lost except in the steepest or the farthest view, where a rise has
+//! its foot: some hundred pixels of millions. Each view is one sample. The logarithm of its loss scatters as
+//! the others' do, by no less than a factor of e, with the counting error on top; a clump counts once. Where
+//! in a view the losses lie tells a rise in distance from one in tilt.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -19,19 +18,19 @@ use crate::rng::Seed;
 use crate::stats::{between, paule_mandel};
 use crate::terms::Extent;
 
-/// Added to a count whose logarithm is taken (Anscombe 1948 has 3/8).
+/// Added to a count before its logarithm is taken (Anscombe 1948 has 3/8).
 const HALF: f64 = 0.5;
-/// Simulations of the null.
+/// Simulations of the null distribution.
 const REPLICATES: u64 = 1000;
 
-/// A step, and what it adds in each of the views: to its level, and along it.
+/// A step, and what it adds to each view: to its log rate, and along its runs.
 struct Column {
     step: Step,
     levels: Vec<f64>,
     runs: Vec<Vec<f64>>,
 }
 
-/// The views as they look to the steps of one direction.
+/// The views as seen by the steps of one direction.
 struct Foot {
     views: Vec<View>,
     lost: Vec<Lost>,
@@ -55,7 +54,7 @@ impl Foot {
         Foot { views, lost, rate, columns }
     }
 
-    /// Logarithms of the views' rates over the usual one. A view without a loss never counts as above it.
+    /// Log rates of the views over the usual rate. A view without losses never counts as above it.
     fn levels(&self, lost: &[Lost]) -> Vec<f64> {
         let rate = usual_rate(&self.views, lost);
         let level = |(lost, v): (&Lost, &View)| {
@@ -65,12 +64,12 @@ impl Foot {
         lost.iter().zip(&self.views).map(level).collect()
     }
 
-    /// The step that fits best where the views have `lost` this: by the views' levels, which differ by
-    /// `scatter` for no reason, and by where in each view it is lost.
+    /// Best step for the losses `lost`: by the views' log rates, which have the variance `scatter` without a
+    /// cause, and by where in each view the losses lie.
     fn best(&self, lost: &[Lost], scatter: f64) -> Option<Best<'_>> {
         let y = self.levels(lost);
         let weights: Vec<f64> = lost.iter().map(|l| 1.0 / variance(l.all, scatter)).collect();
-        // A slope of the view's own is as good as any: what single losses say is bounded by it.
+        // A random slope of the view would explain its losses too, which bounds their weight.
         let bound = |l: &Lost| 1.0 + l.all * SLOPE * SLOPE / 3.0;
         let (mut a, mut b) = (vec![0.0; y.len()], vec![0.0; y.len()]);
         let each = self.columns.iter().map(|column| {
@@ -101,8 +100,8 @@ struct Best<'a> {
     column: &'a Column,
 }
 
-/// The step whose foot the views' losses follow, at `rim` px or more from the target's edge, where noise
-/// alone brings as much with a chance of no more than `level`.
+/// Step whose foot the losses follow, at `rim` px or more from the target's edge, and its p-value; `None`
+/// unless that is below `level`.
 pub fn few_losses(
     fine: &[Vec<Cell<'_>>],
     rim: f64,
@@ -148,7 +147,7 @@ pub fn few_losses(
         .then(|| (Judged { shape, gain, coefficients: vec![size] }, noise.p(gain)))
 }
 
-/// Share that is lost anyway: in the half of the views that lose the smallest shares.
+/// Share lost anyway: pooled over the half of the views with the smallest shares.
 fn usual_rate(views: &[View], lost: &[Lost]) -> f64 {
     let mut each: Vec<[f64; 2]> = lost.iter().zip(views).map(|(l, v)| [l.all, v.asked]).collect();
     each.sort_by(|a, b| (a[0] / a[1]).total_cmp(&(b[0] / b[1])));
@@ -157,9 +156,8 @@ fn usual_rate(views: &[View], lost: &[Lost]) -> f64 {
     lost / asked
 }
 
-/// By how much the views' logarithms differ for no reason, in square, beside what their counts err by:
-/// where the squares that are `left`, over what is expected of them, come to one a view (Paule and
-/// Mandel 1982).
+/// Variance of the views' log rates without a cause, beyond their counting error: where the squared residuals
+/// `left` over their expected values sum to one per view (Paule and Mandel 1982).
 fn scatter(left: &[f64], lost: &[f64]) -> f64 {
     let views = left.iter().zip(lost);
     let each: Vec<(f64, f64)> =

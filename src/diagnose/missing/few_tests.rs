@@ -7,8 +7,8 @@ const VIEWS: usize = 16;
 const SIDE: f64 = 4.0;
 const ACROSS: usize = 30;
 
-/// Views ever steeper and, in another order, ever farther, each by a tenth farther on its right than on
-/// its left; `lost` says what a patch loses.
+/// Views of increasing tilt and, in another order, increasing distance, each a tenth farther on its right
+/// than on its left. `lost` gives what a patch loses.
 fn session(mut lost: impl FnMut(usize, usize) -> f64) -> (Vec<Vec<Patch>>, Extent) {
     let view = |view: usize| -> Vec<(usize, PixelContext)> {
         let theta = (4.5 * view as f64).to_radians();
@@ -35,12 +35,12 @@ fn session(mut lost: impl FnMut(usize, usize) -> f64) -> (Vec<Vec<Patch>>, Exten
     (patches, reach)
 }
 
-/// How far right in its view a patch lies, from 0 to 1.
+/// Place of a patch across its view, 0 (left) to 1.
 fn right(i: usize) -> f64 {
     (i % ACROSS) as f64 / ACROSS as f64
 }
 
-/// A share that falls off over a sixteenth of a view.
+/// Share lost, falling off exponentially over 0.06 of a view.
 fn fall(over: f64) -> f64 {
     0.6 * (-over / 0.06).exp()
 }
@@ -52,7 +52,7 @@ fn found((patches, reach): &(Vec<Vec<Patch>>, Extent)) -> Option<Axis> {
 #[test]
 fn the_foot_of_a_rise_is_seen_in_the_steepest_view_the_farthest_and_the_nearest() {
     let mut rng = Seed(5).stream("few");
-    // Of seven times its number modulo 16 the tenth view has the most, and the first the least.
+    // 7 * view % 16 is largest for the tenth view and smallest for the first.
     type Rise<'a> = &'a dyn Fn(usize) -> f64;
     let cases: [(usize, Rise<'_>, Axis); 3] = [
         (VIEWS - 1, &|_| 0.08, Axis::Theta),
@@ -65,7 +65,7 @@ fn the_foot_of_a_rise_is_seen_in_the_steepest_view_the_farthest_and_the_nearest(
     }
 }
 
-/// As far as any, but lost only in the later of the two views that reach there.
+/// At the farthest distance, but only in the later of the two views that reach it.
 #[test]
 fn a_foot_that_begins_in_the_midst_of_the_session_is_seen() {
     let mut rng = Seed(8).stream("few");
@@ -82,8 +82,7 @@ fn a_foot_that_begins_in_the_midst_of_the_session_is_seen() {
     assert!(axis == Axis::Z && start.is_some_and(|s| (120.0..540.0).contains(&s)), "{start:?}");
 }
 
-/// A clump counts once, views in the middle of both axes follow none, and what is lost alike in
-/// all views follows nothing.
+/// A clump counts once, views in the middle of both axes follow neither, and even losses follow nothing.
 #[test]
 fn clumps_other_views_and_even_losses_are_no_foot() {
     let mut rng = Seed(6).stream("few");
@@ -97,8 +96,7 @@ fn clumps_other_views_and_even_losses_are_no_foot() {
     assert_eq!(found(&session(|_, _| 0.0)), None);
 }
 
-/// Views that differ for no reason by a factor of e, and their sides by as much: the level that was asked
-/// for holds.
+/// Views differ by a factor of e without a cause, and so do their sides: the level asked for holds.
 #[test]
 fn views_that_differ_for_no_reason_seldom_look_like_a_foot() {
     let mut alarms = 0;

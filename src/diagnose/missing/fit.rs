@@ -1,5 +1,5 @@
-//! The step itself: where half is lost and how gradually, by weighted least squares on shares. The foot
-//! of a rise alone does not say how wide it is: the width is held by what is typical of its kind.
+//! Fits a step (where half is lost, and how gradually) by weighted least squares on shares. The foot of a
+//! rise alone does not determine its width, so the width has a prior at its kind's typical value.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,20 +12,20 @@ use crate::solve::{LeastSquares, trust_region};
 #[derive(Debug, Clone, Copy)]
 pub struct Fitted {
     pub step: Step,
-    /// Of middle, width and share; `None` where the share was not fitted.
+    /// Standard errors of middle, width and share; `None` where unknown or not fitted.
     pub std_error: [Option<f64>; 3],
 }
 
-/// A share of its own must lower chi squared by this: 1 % of chance.
+/// Decrease in chi-squared that a free share must bring: the 1 % level.
 const WORTH: f64 = 6.6;
 
-/// Middle, logarithm of the width, and logit of the share where it is free.
+/// Parameters: middle, log width and, where the share is free, its logit.
 struct Problem<'a> {
     points: &'a [Point],
     start: Step,
     base: f64,
     free_share: bool,
-    /// A few lost pixels at the end of the range are the toe of a step anywhere.
+    /// Without it a few lost pixels at the end of the range fit the toe of a step anywhere.
     allowed: Option<&'a Allowed>,
 }
 
@@ -35,7 +35,7 @@ impl Problem<'_> {
         Step { middle: x[0], width: self.start.width.signum() * x[1].exp(), share, ..self.start }
     }
 
-    /// Of the points, and of the width from what is typical.
+    /// Residuals of the points, and of the width from its typical value.
     fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
         let step = self.step(x);
         let of = |p: &Point| misfit(p, step.loss(p.x, self.base));
@@ -77,7 +77,7 @@ impl LeastSquares for Problem<'_> {
     }
 }
 
-/// Refine a step found on the grid.
+/// Refines a step found on the grid.
 pub fn fit(start: Step, base: f64, points: &[Point]) -> Option<Fitted> {
     let allowed = allowed(&start);
     let solve = |free_share: bool| {

@@ -1,8 +1,8 @@
-//! How far the numbers told of a step may be off, whatever the form of its rise.
+//! Errors of a step's reported parameters, whatever the form of its rise.
 //!
-//! A recording often shows no more than the foot of a rise; where its middle lies then depends on
-//! the form. So the posterior is summed over several forms, on a grid that closes in on it: the middle
-//! anywhere that the card allows, the width within a factor of e or so of what the card calls typical.
+//! A recording often shows only the foot of a rise; where its middle lies then depends on the form. The
+//! posterior is therefore summed over several forms, on a grid that closes in on it: the middle anywhere the
+//! effect's card allows, the width within a factor of e or so of the card's typical value.
 
 use rayon::prelude::*;
 use statrs::function::erf::erfc;
@@ -14,9 +14,9 @@ use crate::effects;
 use crate::stats::even;
 use crate::terms::Axis;
 
-/// From nothing lost to all, one half at 0. A pattern's contrast falls short of a threshold: by
-/// logistic or Gaussian noise, or by the noise of the best or of the worst of many places.
-/// Each is in the unit that its own formula calls a width, since that is what others will state.
+/// Rises from nothing lost to everything, one half at 0. A pattern's contrast falls short of a threshold by
+/// logistic or Gaussian noise, or by the noise of the best or the worst of many places. Each is in the unit
+/// its own formula calls a width, since others will report that.
 const RISES: [fn(f64) -> f64; 4] = [
     |t| 1.0 / (1.0 + (-t).exp()),
     |t| 0.5 * erfc(-t * std::f64::consts::FRAC_1_SQRT_2),
@@ -24,18 +24,18 @@ const RISES: [fn(f64) -> f64; 4] = [
     |t| 1.0 - (-std::f64::consts::LN_2 * t.exp()).exp(),
 ];
 
-/// Nodes along each side of a grid, and how often it closes in.
+/// Nodes along each side of a grid, and number of grids.
 const NODES: usize = 24;
 const ROUNDS: usize = 3;
-/// What is this much less probable, in nats, is left out.
+/// Nodes this many nats below the best are dropped.
 const NEGLIGIBLE: f64 = 8.0;
-/// The least width that is tried, as a share of the greatest.
+/// Smallest width tried, as a share of the largest.
 const NARROWEST: f64 = 1e-3;
-/// As narrow as an edge need be followed: a driver's limit has no width at all.
+/// Narrowest edge a fit may follow; a driver's limit has no width at all.
 const NARROWEST_EDGE: f64 = 1e-4;
 
-/// Root mean square distances of middle and width from those `reported`; the points scatter by the
-/// factor `scatter` more, in variance, than they are expected to.
+/// RMS deviations of middle and width from those `reported`. `scatter` is the dispersion of the points: their
+/// variance over what is expected.
 pub fn errors(reported: &Step, base: f64, points: &[Point], scatter: f64) -> Option<[f64; 2]> {
     let Allowed { middles, widths, typical } = allowed(reported)?;
     let rising =
@@ -50,7 +50,7 @@ pub fn errors(reported: &Step, base: f64, points: &[Point], scatter: f64) -> Opt
     errors.iter().all(|e| e.is_finite()).then_some(errors)
 }
 
-/// In the axis's own unit; widths by their size.
+/// Catalogue limits in the axis's own unit; widths are absolute.
 pub struct Allowed {
     middles: [f64; 2],
     widths: [f64; 2],
@@ -70,12 +70,12 @@ impl Allowed {
     }
 }
 
-/// How far a width is from the typical one, in standard deviations: a factor of e is one.
+/// Deviation of a width from the typical one, in standard deviations; a factor of e is one.
 fn untypical(width: f64, typical: f64) -> f64 {
     (width / typical).ln()
 }
 
-/// What the catalogue allows of such a step.
+/// Returns what the catalogue allows for such a step.
 pub fn allowed(step: &Step) -> Option<Allowed> {
     let unit = if step.axis == Axis::Theta { 1f64.to_radians() } else { 1.0 };
     let card = effects::find(step.family())?.card();
@@ -88,17 +88,17 @@ pub fn allowed(step: &Step) -> Option<Allowed> {
     })
 }
 
-/// A place of the grid.
+/// A node of the grid.
 #[derive(Debug, Clone, Copy)]
 struct Node {
     middle: f64,
     width: f64,
     area: f64,
-    /// Nats.
+    /// Negative log posterior, nats.
     misfit: f64,
 }
 
-/// A form of the rise, held against the points.
+/// A form of the rise, compared with the points.
 struct Rising<'a> {
     reported: &'a Step,
     base: f64,
@@ -109,7 +109,7 @@ struct Rising<'a> {
 }
 
 impl Rising<'_> {
-    /// Nats below a perfect fit of a typical width; infinite as soon as it is beyond `limit`.
+    /// Nats below a perfect fit of typical width; infinite as soon as it exceeds `limit`.
     fn misfit(&self, middle: f64, width: f64, limit: f64) -> f64 {
         let lost = self.reported.share * (1.0 - self.base);
         let toward = self.reported.width.signum() / width;
@@ -124,7 +124,7 @@ impl Rising<'_> {
         sum
     }
 
-    /// The last grid's nodes that matter.
+    /// Nodes of the last grid that are not negligible.
     fn nodes(&self, middles: [f64; 2], logs: [f64; 2]) -> Vec<Node> {
         let mut across = around(self.reported.middle, self.reported.width.abs(), middles);
         let mut along: Vec<f64> = even(logs, NODES).collect();
@@ -148,7 +148,7 @@ impl Rising<'_> {
     }
 }
 
-/// Denser near a place: in steps that grow from a fraction of `width` to all that is allowed.
+/// Grid around a place, in steps that grow from a fraction of `width` to the whole allowed range.
 fn around(place: f64, width: f64, [low, high]: [f64; 2]) -> Vec<f64> {
     let first = 0.1 * width;
     let growth = |reach: f64| (reach / first).max(2.0).powf(1.0 / (NODES - 1) as f64);
@@ -163,13 +163,13 @@ fn around(place: f64, width: f64, [low, high]: [f64; 2]) -> Vec<f64> {
     all
 }
 
-/// Half of the way to either neighbour.
+/// Half the distance between a node's neighbours.
 fn side(grid: &[f64], k: usize) -> f64 {
     let at = |k: usize| grid[k.min(grid.len() - 1)];
     0.5 * (at(k + 1) - at(k.saturating_sub(1)))
 }
 
-/// A finer grid over what these nodes and their neighbours hold.
+/// Finer grid over the range of these nodes and their neighbours.
 fn closer(grid: &[f64], nodes: impl Iterator<Item = usize>) -> Vec<f64> {
     let (first, last) = nodes.fold((grid.len(), 0), |(a, b), k| (a.min(k), b.max(k)));
     let last_node = grid.len().saturating_sub(1);

@@ -1,4 +1,4 @@
-//! A hard end of the range: beyond it all is missing, by the sensor's driver or format.
+//! Hard end of the range: everything beyond it is missing because of the sensor's driver or format.
 
 use super::cells::Cell;
 use super::points::Point;
@@ -7,50 +7,50 @@ use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::terms::Axis;
 
-/// An edge narrower than this share of its distance, or than the noise there, is a limit that a driver
-/// or a format has set (the noise blurs it so); a pattern that grows faint goes gradually.
+/// An edge narrower than this share of its distance, or than the noise that blurs it there, is a limit set by
+/// a driver or format. A fading pattern loses readings gradually.
 const HARD_END_SHARE: f64 = 0.01;
-/// So many limits on either side of the middle are looked at pixel by pixel: an edge as wide as the limit has
+/// Limits on either side of the middle that are examined pixel by pixel; an edge as wide as the limit has
 /// lost 2 % there.
 const CLOSE: f64 = 4.0;
-/// What a driver's limit lets pass, farther beyond it than that: none but strays.
+/// Largest share that a driver's limit lets pass farther beyond it than that: strays only.
 const STRAYS: f64 = 0.1;
 
-/// What the pixels say of the losses about a depth.
+/// Losses about a depth, pixel by pixel.
 pub struct CloseLook<'a> {
-    /// Standard deviation of the depth there, m.
+    /// Standard deviation of the depth at a depth, m.
     pub blur: &'a dyn Fn(f64) -> f64,
-    /// The views' shares within a span of depths, m.
+    /// Shares lost per view within a span of depths, m.
     pub points: &'a dyn Fn([f64; 2]) -> Vec<Point>,
     /// Depths that the views reach, m.
     pub reach: [f64; 2],
 }
 
-/// Beyond it (or before it) all is missing.
+/// Depth beyond (or before) which everything is missing.
 pub struct HardEnd {
     z_m: f64,
-    /// Negative where what is nearer is lost.
+    /// Negative where nearer readings are lost.
     width_m: f64,
-    /// So far before it nothing is lost by it any more, m.
+    /// Distance before the end from which it loses nothing any more, m.
     felt_m: f64,
 }
 
 impl HardEnd {
-    /// A step in depth is one where it was fitted as narrow, or else where the pixels show a cut: what is lost
-    /// lies beyond it and what is measured before it, but for fewer than an edge as wide as the limit would
-    /// mix. `base` is lost anyway.
+    /// Returns the hard end, if a step in depth is one: either it was fitted as that narrow, or the pixels
+    /// show a cut, with losses beyond and measurements before it, but for fewer than an edge as wide as the
+    /// limit would mix. `base` is lost anyway.
     pub fn of(step: &Step, width_error: f64, base: f64, look: &CloseLook<'_>) -> Option<Self> {
         if step.axis != Axis::Z || step.share < 1.0 - STRAYS {
             return None;
         }
-        // The middle of a rise of which the foot alone is seen lies beyond; that of a hard end does not.
+        // A rise of which only the foot is seen has its middle beyond the reach; a hard end does not.
         let [near, far] = look.reach;
         let (middle, toward) = (step.middle.max(near).min(far), step.width.signum());
         let limit = f64::max(HARD_END_SHARE * middle, (look.blur)(middle));
         let fitted = HardEnd { z_m: step.middle, width_m: step.width, felt_m: CLOSE * limit };
         let narrow = step.width.abs() + width_error < limit;
         let end = if narrow { fitted } else { HardEnd::cut(middle, toward * limit, base, look)? };
-        // What begins in the midst of a session is none either: other views pass it.
+        // Losses that begin mid-session are no hard end either: other views measure beyond it.
         let past = end.z_m + toward * CLOSE * limit;
         let beyond = if toward > 0.0 { [past, far] } else { [near, past] };
         let all = if beyond[0] < beyond[1] { (look.points)(beyond) } else { Vec::new() };
@@ -58,7 +58,7 @@ impl HardEnd {
         (sum(|p| p.asked * (1.0 - p.share)) <= STRAYS * sum(|p| p.asked)).then_some(end)
     }
 
-    /// The cut about `middle`, narrower than `limit`, which is negative where what is nearer is lost.
+    /// Finds the cut about `middle`, narrower than `limit`, which is negative where nearer readings are lost.
     fn cut(middle: f64, limit: f64, base: f64, look: &CloseLook<'_>) -> Option<Self> {
         let close = CLOSE * limit.abs();
         let mut points = (look.points)([middle - close, middle + close]);
@@ -69,7 +69,7 @@ impl HardEnd {
         let of_edge =
             |p: &Point| p.asked * edge.loss(z_m - limit.signum() * (p.x - z_m).abs(), 0.0);
         let (mixed, widest) = (before + measured, points.iter().map(of_edge).sum::<f64>());
-        // Of the foot of a rise most is lost before any cut; and one distance alone shows none.
+        // The foot of a rise has most of its losses before any cut, and a single distance shows no cut.
         let all_lost: f64 = points.iter().map(lost).sum();
         let all_measured: f64 = points.iter().map(|p| p.asked - lost(p)).sum();
         let is_cut =
@@ -84,18 +84,18 @@ impl HardEnd {
         !self.spares(cell.place.z + half * self.width_m.signum())
     }
 
-    /// Is nothing lost by it at this depth?
+    /// Whether it loses nothing at this depth.
     pub fn spares(&self, z: f64) -> bool {
         (z - self.z_m) * self.width_m.signum() <= -self.felt_m
     }
 
-    /// Of depths that are reached, those that it spares.
+    /// Part of a range of depths that it spares.
     pub fn spared(&self, [near, far]: [f64; 2]) -> [f64; 2] {
         let last = self.z_m - self.felt_m * self.width_m.signum();
         if self.width_m > 0.0 { [near, far.min(last)] } else { [near.max(last), far] }
     }
 
-    /// What it loses.
+    /// Its losses as a step.
     pub fn step(&self) -> Step {
         Step::whole(Axis::Z, self.z_m, self.width_m)
     }
@@ -109,14 +109,14 @@ impl HardEnd {
     }
 }
 
-/// A depth, and the pixel-frames on the wrong side of it: lost before it, and measured beyond.
+/// A depth, and the pixel-frames on its wrong side: lost before it, or measured beyond it.
 struct Cut {
     z_m: f64,
     before: f64,
     measured: f64,
 }
 
-/// The cut with fewest of them, between two of these points as they come.
+/// The cut with the fewest of them, between two consecutive points.
 fn best_cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<Cut> {
     let measured = points.iter().map(|p| p.asked - lost(p)).sum();
     let mut best = Cut { z_m: points.first()?.x, before: 0.0, measured };
@@ -131,7 +131,7 @@ fn best_cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<Cut> {
     Some(best)
 }
 
-/// Standard deviation of the depth, by the model, where the views come nearest to `z`, m.
+/// Standard deviation of the depth by the model, m, where the views come nearest to `z`.
 pub fn blur(survey: &Survey, z: f64) -> f64 {
     let patches = survey.views.iter().flat_map(SurveyedView::patches);
     let nearest = patches.min_by(|(a, _), (b, _)| (a.z - z).abs().total_cmp(&(b.z - z).abs()));
@@ -142,8 +142,8 @@ pub fn blur(survey: &Survey, z: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Six views that run steadily through 5.5 to 6.1 m, some hundred pixels of eight frames in a bin, of which
-    /// `loss` loses a share; a corner of one alone reaches the end.
+    /// Six views that run evenly through 5.5 to 6.1 m, with about a hundred pixels of eight frames in a bin,
+    /// of which `loss` loses a share. Only a corner of one view reaches the end.
     fn end(loss: impl Fn(f64) -> f64) -> Option<HardEnd> {
         let view = |view: usize| {
             let far = if view == 0 { 6.1 } else { 5.9 };
@@ -186,7 +186,7 @@ mod tests {
         assert!(judged(&walls, 5.95).is_none());
     }
 
-    /// The same distances are measured in another view: no driver's limit.
+    /// Another view measures the same distances, so there is no driver's limit.
     #[test]
     fn an_end_that_other_views_pass_is_none() {
         let at =

@@ -1,8 +1,8 @@
-//! The layer of what is not there: which pixels give no answer, and what it follows.
+//! Dropout layer: finds what the missing measurements depend on.
 //!
-//! Losses are judged in log odds, view by view, against views that differ for no reason by a
-//! factor of e and more: a finding must hold over the views. Steps on lawful axes have a name
-//! unless a nameless curve does clearly better.
+//! Losses are judged in log odds, view by view. Views differ for no reason, typically by a factor of e, so a
+//! finding must hold across views. Steps in range or tilt have a name unless a nameless curve does clearly
+//! better.
 
 pub mod cells;
 mod clumps;
@@ -37,17 +37,17 @@ use round::Round;
 use search::{Judged, times};
 use shapes::{Shapes, Step};
 
-/// All that was found missing.
+/// Outcome of the dropout search.
 #[derive(Debug, Clone, Default)]
 pub struct DropoutOutcome {
     /// Largest gain first.
     pub findings: Vec<Finding>,
-    /// Families with the middle of the faintest whole step that 80 % of such recordings would
-    /// show, in degrees or m: what begins farther out is not seen.
+    /// Per family, the middle of the faintest whole step that 80 % of such recordings would show, in degrees
+    /// or m. A step that begins farther out goes unseen.
     pub detectable: Vec<Detectable>,
-    /// Hard ends of the range, which are no findings.
+    /// Hard ends of the range; they are not findings.
     pub ends: Vec<Step>,
-    /// What is no finding, in words.
+    /// Remarks that are not findings.
     pub notes: Vec<String>,
 }
 
@@ -58,20 +58,21 @@ impl DropoutOutcome {
     }
 }
 
-/// Fewer views show no rule.
+/// Fewest views that can show a rule.
 const MIN_VIEWS: usize = 4;
-/// Chance of a finding on a clean recording: the steps and curves, and the shadow.
+/// False-alarm probability on a clean recording: for steps and curves, and for the shadow.
 pub const LEVEL: f64 = 0.003;
-/// By which it may come: of what is always there, of what begins in the midst, and of a rise's foot.
+/// Tests that share [`LEVEL`]: constant steps and curves, steps that begin mid-session, and the foot of a
+/// rise.
 const TESTS: f64 = 3.0;
 const SHADOW_LEVEL: f64 = 0.0005;
 const MAX_FINDINGS: usize = 3;
-/// A later finding must bring this share of what the first brought.
+/// Least gain of a later finding, as a share of the first finding's.
 const MIN_OF_FIRST: f64 = 0.1;
 
-/// What the losses of a recording follow.
+/// Finds what the losses of a recording depend on.
 ///
-/// `twins` are the same views without what is looked for: what they lose is expected.
+/// `twins` are the same views without the effects looked for; what they lose is expected.
 pub fn missing(
     fields: &[Field],
     twins: Option<(&[Field], &Survey)>,
@@ -102,7 +103,7 @@ pub fn missing(
         let mut shadow = shadow_finding(band, fields);
         let of_all = shadow.of_some.is_none();
         shadow.replicated = of_all.then(|| bands_agree(&sides, &seen.second)).flatten();
-        // Where the target's own mask reaches into its shadow, the same losses are seen again; a
+        // Where the target's own mask reaches into its shadow, the search finds the same losses again. A
         // region that was given ends at the target.
         let grown = seen.region_given.contains(&false);
         let larger = |f: &Finding| f.size.sigma > shadow.size.sigma;
@@ -112,7 +113,7 @@ pub fn missing(
     outcome
 }
 
-/// What losses are searched with.
+/// Inputs of the dropout search.
 struct DropoutSearch<'a> {
     reach: &'a Extent,
     camera: &'a Camera,
@@ -147,8 +148,8 @@ impl DropoutSearch<'_> {
             if taken.is_empty() {
                 outcome.notes.extend(lost_everywhere(always.ledger.base));
             }
-            // Steps that begin in the midst of the session are tried where none is found that is always there.
-            // Few views show how they scatter from then on: that is not trusted below what is usual.
+            // Steps that begin mid-session are tried only where no constant one is found. Few views show the
+            // scatter after the start, so it is not trusted below the usual.
             let mut won = self.won(&always, seen);
             let mut round = always;
             if outcome.findings.is_empty() && won.is_none() {
@@ -180,16 +181,16 @@ impl DropoutSearch<'_> {
                 None => outcome.findings.push(later.as_ref().map_or(finding, told)),
             }
         }
-        // Counts are not compared with a twin's.
+        // Total counts are not compared with a twin's.
         if outcome.findings.is_empty() && seen.expected.is_none() {
             return self.few(seen, outcome);
         }
         outcome
     }
 
-    /// What is seen in a round, by its number, and the nats that count for it. Held against a twin it must still
-    /// be seen when any single view is left out, unless it is a hard end of the range, which the farthest view may
-    /// cross alone.
+    /// Index of the shape detected in a round, and the nats that count for it. Beside a twin, the shape must
+    /// still be detected when any single view is left out. A hard end of the range is exempt: the farthest
+    /// view may cross it alone.
     fn won(&self, round: &Round<'_>, seen: &DropoutCells<'_>) -> Option<(usize, f64)> {
         if seen.expected.is_none() {
             return round.won();
@@ -202,14 +203,14 @@ impl DropoutSearch<'_> {
         if ends { Some((first, gain)) } else { round.won_beyond_one_view() }
     }
 
-    /// Where nothing else is found: losses too few to be a share of a patch.
+    /// Losses too few to form a share of a patch, where nothing else is found.
     fn few(&self, seen: &DropoutCells<'_>, mut outcome: DropoutOutcome) -> DropoutOutcome {
         let (rim, level) = (rim_px(self.camera), LEVEL / TESTS);
         let Some((foot, p)) = few_losses(&seen.fine, rim, self.reach, level, self.seed) else {
             return outcome;
         };
         let finding = self.reporter(seen, 0.0).finding(&foot, &rivals([&foot]), TESTS * p);
-        // A corner of a view that is cut off looks like the foot of a rise.
+        // A view whose corner is cut off by a hard end looks like the foot of a rise.
         match self.end(&finding, 0.0) {
             Some(end) if touches(&seen.fine, &end) => return self.within(&end, seen),
             Some(end) => outcome.take_end(&end),
@@ -218,7 +219,7 @@ impl DropoutSearch<'_> {
         outcome
     }
 
-    /// Nothing is learnt beyond a hard end: what is lost inside it is looked at alone.
+    /// Repeats the search on the losses inside a hard end; those beyond it carry no information.
     fn within(&self, end: &HardEnd, seen: &DropoutCells<'_>) -> DropoutOutcome {
         let spared =
             |span| (self.look.points)(span).into_iter().filter(|p| end.spares(p.x)).collect();
@@ -229,7 +230,7 @@ impl DropoutSearch<'_> {
         rest
     }
 
-    /// Is what was found a hard end of the range?
+    /// The hard end of the range, if the finding is one.
     fn end(&self, found: &Finding, base: f64) -> Option<HardEnd> {
         let step = Step::of(found.effect?, |name| found.value(name))?;
         let error = found.parameters.get("width_m").and_then(|w| w.get("std_error")?.as_f64());
@@ -247,7 +248,7 @@ impl DropoutSearch<'_> {
     }
 }
 
-/// A share of the readings that is lost wherever the target is: no model says how many there should be.
+/// Note on readings lost wherever the target is; the model predicts no such share.
 fn lost_everywhere(share: f64) -> Option<String> {
     const WORTH_A_WORD: f64 = 0.005;
     (share > WORTH_A_WORD).then(|| {

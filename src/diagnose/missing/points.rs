@@ -13,17 +13,17 @@ pub struct Point {
     pub x: f64,
     pub share: f64,
     pub asked: f64,
-    /// The true share may be larger.
+    /// Whether the share is a lower bound.
     pub at_least: bool,
 }
 
-/// Bins over an axis's reach: a tilted view spans some.
+/// Bins over an axis's reach; a tilted view spans several.
 pub const BINS: usize = 40;
 
-/// Where more is lost the search for the target passes over the holes: the share is a bound.
+/// Share lost from which the target search passes over the holes, so that shares are lower bounds.
 const HOLES: f64 = 0.4;
 
-/// In views whose region was not given, what lies beyond the first bin with holes is a bound.
+/// Marks points beyond the first bin with holes as lower bounds, in views whose region was not given.
 pub fn bounded(mut points: Vec<Point>, step: &Step, region_given: &[bool]) -> Vec<Point> {
     let beyond = |p: &Point| p.x * step.width.signum();
     let from = points.iter().filter(|p| p.share > HOLES).map(beyond).fold(f64::INFINITY, f64::min);
@@ -33,13 +33,13 @@ pub fn bounded(mut points: Vec<Point>, step: &Step, region_given: &[bool]) -> Ve
     points
 }
 
-/// Which of so many equal parts of a span `x` lies in, the outermost if beyond.
+/// Index of the equal part of a span that holds `x`, clamped to the outermost parts.
 pub fn part(x: f64, [low, high]: [f64; 2], parts: usize) -> usize {
     let width = ((high - low) / parts as f64).max(f64::MIN_POSITIVE);
     (((x - low) / width).max(0.0) as usize).min(parts - 1)
 }
 
-/// The views' shares, bin by bin of an axis; `at` tells where on it a cell lies, if it counts.
+/// Shares lost per view and bin of an axis; `at` gives a cell's place on it, if it counts.
 pub fn points(
     views: &[Vec<Cell<'_>>],
     at: &dyn Fn(&Cell<'_>) -> Option<f64>,
@@ -51,8 +51,8 @@ pub fn points(
     views.iter().enumerate().flat_map(of_view).collect()
 }
 
-/// The same over depth and pixel by pixel, of what lies within the span: a tile of a steep target is
-/// deeper than an edge is wide.
+/// Same over depth, pixel by pixel within the span: a tile of a steep target spans more depth than an edge is
+/// wide.
 pub fn points_of_pixels(
     fields: &[Field],
     rays: &Rays,
@@ -73,7 +73,7 @@ pub fn points_of_pixels(
     fields.iter().enumerate().flat_map(of_view).collect()
 }
 
-/// One view's shares, of places on the axis with what each has lost and was asked.
+/// Bins one view's places on the axis, each with what was lost and asked there, into shares.
 fn binned(view: usize, all: impl Iterator<Item = [f64; 3]>, span: [f64; 2]) -> Vec<Point> {
     let mut sums = [[0.0; 3]; BINS];
     for [x, lost, asked] in all {
@@ -90,14 +90,14 @@ fn binned(view: usize, all: impl Iterator<Item = [f64; 3]>, span: [f64; 2]) -> V
     sums.iter().filter(|s| s[0] > 0.0).map(point).collect()
 }
 
-/// Views are off the step by this, in log odds, and neighbours lose their pixels together.
+/// Standard deviation of views about the step, in log odds, and number of neighbours lost together.
 const OFF: f64 = 0.3;
 const TOGETHER: f64 = 16.0;
-/// Shares are known no better.
+/// Smallest standard error of a share.
 const MIN_ERROR: f64 = 0.002;
-/// How far a point lies from an expected loss, in its standard errors.
+/// Residual of a point from an expected loss, in standard errors.
 pub fn misfit(p: &Point, loss: f64) -> f64 {
-    // Between what was expected and what was seen: neither alone may claim certainty.
+    // Midway between expected and observed: neither alone may claim certainty.
     let half = 0.5 * (loss + p.share);
     let spread = half * (1.0 - half);
     let variance = spread * TOGETHER / p.asked + (OFF * spread).powi(2) + MIN_ERROR * MIN_ERROR;

@@ -1,4 +1,4 @@
-//! Findings of the layer of losses, put in numbers: parameters, interval, size, curve.
+//! Quantifies dropout findings: parameters, interval, size and curve.
 
 use serde_json::{Map, Value, json};
 
@@ -19,15 +19,15 @@ use crate::effects;
 use crate::stats::range;
 use crate::terms::{Axis, Basis, Extent, Statistic};
 
-/// An effect matters from this lost share on.
+/// Lost share from which an effect matters.
 const MATTERS: f64 = 0.05;
-/// A name must explain this share of what the best nameless curve does.
+/// Share of the best nameless curve's gain that a name must reach.
 pub const NAME_ADEQUATE: f64 = 0.6;
 
-/// Families and nameless axes that were looked for, nats, best first.
+/// Families and nameless axes that were tried, nats, best first.
 pub type Rivals = [(&'static str, f64)];
 
-/// Names and axes without one, each by the best of its shapes.
+/// Families and nameless axes, each with the gain of its best shape.
 pub fn rivals<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Vec<(&'static str, f64)> {
     let mut all: Vec<(&'static str, f64)> = Vec::new();
     for j in judged {
@@ -39,9 +39,9 @@ pub fn rivals<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Vec<(&'static
     all
 }
 
-/// Writes findings, from what the views lost.
+/// Writes findings from the losses of the views.
 pub struct DropoutReporter<'a> {
-    /// The views' losses in the smallest patches.
+    /// Losses of the views in the smallest patches.
     pub fine: &'a [Vec<Cell<'a>>],
     /// Whether each view's region was given.
     pub region_given: &'a [bool],
@@ -51,11 +51,11 @@ pub struct DropoutReporter<'a> {
     pub camera: &'a Camera,
 }
 
-/// Where a cell lies on an axis.
+/// Place of a cell on an axis, if it counts.
 type At = Box<dyn Fn(&Cell<'_>) -> Option<f64>>;
 
 impl DropoutReporter<'_> {
-    /// What losses of this shape are told as; noise alone brings as much with the chance `p`.
+    /// Finding for losses of this shape; `p` is its p-value.
     pub fn finding(&self, won: &Judged, rivals: &Rivals, p: f64) -> Finding {
         let (mut family, axis) = (won.shape.family(), won.shape.axis());
         let mut finding = Finding {
@@ -73,8 +73,9 @@ impl DropoutReporter<'_> {
         described(finding, family, rivals, Some(&won.shape))
     }
 
-    /// Do the losses follow the step, or are they farther from it than from none? The numbers of one that goes with
-    /// the angle of incidence are those of the nearest step over the plane's tilt, which is what a model has.
+    /// Fits the step and fills in the finding. Returns whether the losses are nearer to the step than to
+    /// none. A step in the angle of incidence gets the parameters of the nearest step in the plane's tilt,
+    /// which is what a model has.
     fn step(&self, step: Step, finding: &mut Finding) -> bool {
         let nearest = |step: Step| {
             let all = self.points(step);
@@ -90,7 +91,7 @@ impl DropoutReporter<'_> {
         let loss = |x: f64| fitted.step.loss(x, self.base);
         finding.parameters = parameters(&fitted);
         finding.interval = interval(&fitted, span);
-        // Of all pixel-frames, those before it began among them.
+        // Relative to all pixel-frames, including those before it began.
         let there: f64 = all.iter().map(|p| p.asked).sum();
         let asked: f64 = self.fine.iter().flatten().map(|c| c.asked).sum();
         finding.size.sigma = there / asked.max(1.0) * mean(&all, |p| loss(p.x) - self.base);
@@ -113,7 +114,7 @@ impl DropoutReporter<'_> {
         bounded(points(self.fine, &at, self.span(step)), &step, self.region_given)
     }
 
-    /// The step where it is nearest to these losses; `None` where none is nearer.
+    /// Fits the step to these losses; `None` where it is no nearer to them than no step.
     fn nearest(&self, step: Step, all: &[Point]) -> Option<Fitted> {
         let own = Fitted { step, std_error: [None; 3] };
         let fitted = fit(step, self.base, all).unwrap_or(own);
@@ -135,7 +136,7 @@ impl DropoutReporter<'_> {
         self.shapeless(&points(self.fine, &at, span), basis.axis(), span, finding);
     }
 
-    /// What was measured, without a law.
+    /// Fills in what was measured, without a law.
     fn shapeless(&self, all: &[Point], axis: Axis, span: [f64; 2], finding: &mut Finding) {
         finding.size.sigma = mean(all, |p| (p.share - self.base).max(0.0));
         let mut curve = binned(all, axis, span, |_| self.base);
@@ -150,7 +151,7 @@ fn mean(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
     points.iter().map(|p| p.asked * of(p)).sum::<f64>() / asked.max(1.0)
 }
 
-/// Where more than half of the greatest excess is lost.
+/// Interval in which more than half of the largest excess is lost.
 fn crowded(curve: &Curve, base: f64, bin: f64) -> [f64; 2] {
     let most = curve.y.iter().copied().fold(base, f64::max) - base;
     let high = curve.x.iter().zip(&curve.y).filter(|(_, y)| **y - base > 0.5 * most);
@@ -174,7 +175,7 @@ fn parameters(fitted: &Fitted) -> Map<String, Value> {
     all
 }
 
-/// From where the loss matters to the end of the axis.
+/// Interval from where the loss matters to the end of the axis.
 fn interval(fitted: &Fitted, [low, high]: [f64; 2]) -> [f64; 2] {
     let Step { middle, width, share, axis, .. } = fitted.step;
     let from = middle + width * (MATTERS / (share - MATTERS).max(MATTERS)).ln();
@@ -185,10 +186,10 @@ fn interval(fitted: &Fitted, [low, high]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// Bins of a curve: a band of a few per cent of the axis is still seen.
+/// Bins of a curve; a band of a few per cent of the axis still shows.
 const BINS: usize = 40;
 
-/// Lost shares bin by bin; the views are the sample.
+/// Lost shares per bin; the views are the sample.
 fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f64) -> Curve {
     let mut curve = Curve {
         x_label: format!("{axis}, {}", axis.unit()),
@@ -212,7 +213,7 @@ fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f
     curve
 }
 
-/// What would be seen of these steps, by where the faintest that is has its middle.
+/// Smallest detectable effects: the middle of the faintest step that would be seen.
 pub fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<Detectable> {
     let minimum = |s: Step| {
         let (name, value) = match (s.axis, s.width > 0.0) {
@@ -226,7 +227,7 @@ pub fn detectable(losses: &Losses<'_>, steps: &[Step], threshold: f64) -> Vec<De
     losses.detectable(steps, threshold).into_iter().map(minimum).collect()
 }
 
-/// A band beside the target.
+/// Finding of a band beside the target.
 pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
     let mut parameters = Map::new();
     if band.lawful {
@@ -254,7 +255,7 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
     finding
 }
 
-/// With its name, if it has one, its rivals, and what is said of both.
+/// Adds the name, if there is one, the rivals, and the description of both.
 fn described(
     found: Finding,
     family: Option<&'static str>,
@@ -277,8 +278,8 @@ fn described(
     Finding { status, effect: family, alternatives, physics: words, shape, ..found }
 }
 
-/// The names that losses may have, by how well each predicts views left out; what a nameless curve
-/// does better is the chance of none.
+/// Probabilities of the names, by how well each predicts views left out. What a nameless curve gains beyond
+/// them gives the probability of none.
 fn weighed(name: &'static str, gain: f64, rivals: &Rivals) -> Vec<Alternative> {
     let best = rivals.first().map_or(gain, |r| r.1);
     let card = |id: &'static str| effects::find(id).map(|e| e.card().id);

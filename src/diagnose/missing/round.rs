@@ -1,4 +1,4 @@
-//! One round of the search for losses: all shapes judged, and which of them is seen.
+//! One round of the dropout search: judges all shapes and selects the detected one.
 
 use super::cells::{Cell, Scatter};
 use super::report::NAME_ADEQUATE;
@@ -9,7 +9,7 @@ use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
-/// Shapes judged with the scatter that the best of them leaves, and what noise alone brings.
+/// Shapes judged with the scatter that the best of them leaves, and the gains of noise alone.
 pub struct Round<'a> {
     pub ledger: Losses<'a>,
     /// Best first.
@@ -37,12 +37,12 @@ impl<'a> Round<'a> {
         self.noise.threshold(LEVEL / TESTS)
     }
 
-    /// The number of what is seen, and the nats that count for it.
+    /// Index of the detected shape, and its gain in nats.
     pub fn won(&self) -> Option<(usize, f64)> {
         choose(&self.judged, &self.seen()).map(|k| (k, self.judged[k].gain))
     }
 
-    /// The same for the best that is still seen when any single view is left out.
+    /// Same for the best shape still detected when any single view is left out.
     pub fn won_beyond_one_view(&self) -> Option<(usize, f64)> {
         let mut open = self.seen();
         while let Some(k) = choose(&self.judged, &open) {
@@ -61,7 +61,7 @@ impl<'a> Round<'a> {
     }
 }
 
-/// Of these, best first, the best step, unless the best curve leaves it behind; by its number.
+/// Index of the best step of `among` (best first), or of the best curve where that leaves the step behind.
 fn choose(judged: &[Judged], among: &[usize]) -> Option<usize> {
     let best =
         |named: bool| among.iter().copied().find(|&k| judged[k].shape.family().is_some() == named);

@@ -1,4 +1,4 @@
-//! What a view runs through on a step's axis, and where along it something is lost.
+//! A view's span along a step's axis, and where along it readings are lost.
 
 use rand::Rng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
@@ -9,19 +9,19 @@ use super::shapes::{Step, is_told_apart};
 use crate::rng::Stream;
 use crate::terms::{Axis, Extent};
 
-/// A view that has lost more has shares to judge by.
+/// Share lost from which a view is judged by shares instead.
 pub const MANY: f64 = 0.1;
-/// So many widths before its middle a logistic rise has lost a three-thousandth.
+/// Widths before its middle at which a logistic rise has lost a three-thousandth.
 const ONSET_WIDTHS: f64 = 8.0;
-/// Middles tried, over as many widths.
+/// Middles tried over this many widths.
 const ONSETS: usize = 16;
-/// For no reason the logarithm of the rate changes so much over half of a view (standard deviation): what is
-/// usual for its slope, over half of a Kinect's picture.
+/// Standard deviation of the log rate over half of a view without a cause: the usual slope over half of a
+/// Kinect's picture.
 pub const SLOPE: f64 = 1.0;
-/// At most so many losses of a simulated view are placed one by one; more are scaled up from them.
+/// Most losses of a simulated view that are placed one by one; more are scaled up from them.
 const PLACED: usize = 100;
 
-/// Where a rise goes: what is steeper is lost, what is farther, or what is nearer.
+/// Direction of a rise: towards steeper tilts, larger distances or smaller ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Toward {
     Steep,
@@ -38,8 +38,7 @@ impl Toward {
         }
     }
 
-    /// Steps of which the views may see the foot: beyond the steepest and the farthest, and before the
-    /// nearest.
+    /// Steps whose foot the views may see: beyond the steepest or the farthest, or before the nearest.
     pub fn onsets(self, reach: &Extent) -> Vec<Step> {
         let axis = if self == Toward::Steep { Axis::Theta } else { Axis::Z };
         if !is_told_apart(axis, reach) {
@@ -60,15 +59,15 @@ impl Toward {
     }
 }
 
-/// A view: how many clumps it could have lost, when, and where along the step's axis.
+/// A view: how many clumps it could have lost, its time, and its span along the step's axis.
 pub struct View {
     pub asked: f64,
     pub session_s: f64,
-    /// What it runs through on the step's axis: where, and its share of the view.
+    /// Places along the step's axis, each with its share of the view.
     pub runs: Vec<[f64; 2]>,
 }
 
-/// Lost by a view: in all, and in each of its runs.
+/// Losses of a view, in all and in each of its runs.
 pub struct Lost {
     pub all: f64,
     pub runs: Vec<f64>,
@@ -92,7 +91,7 @@ impl View {
         (view, Lost { all: lost / clump, runs })
     }
 
-    /// Of nothing but noise, where so many are `expected`.
+    /// Draws losses of noise alone, `expected` of them on average.
     pub fn draw(&self, expected: f64, rng: &mut Stream) -> Lost {
         let all = Poisson::new(expected).map_or(0.0, |p| p.sample(rng));
         let mut runs = vec![0.0; self.runs.len()];
@@ -115,8 +114,8 @@ impl View {
         Lost { all, runs }
     }
 
-    /// What a step adds to the logarithm of the view's rate where `rate` is there anyway, and to that of
-    /// each run beyond it.
+    /// Increase in the view's log rate due to a step, where `rate` is lost anyway, and in each run's beyond
+    /// the view's.
     pub fn added(&self, step: &Step, rate: f64) -> (f64, Vec<f64>) {
         if step.before(self.session_s) {
             return (0.0, Vec::new());

@@ -1,4 +1,4 @@
-//! Which shape the losses follow, judged on views it was not fitted to.
+//! Judges which shape the losses follow, on views left out of its fit.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,41 +14,41 @@ use crate::diagnose::search::null::Null;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
-/// Precision of a step's size about the whole one: half of it is as likely as one and a half.
+/// Prior precision of a step's size about the whole step: 1 ± 0.5.
 const STEP_PRECISION: f64 = 4.0;
-/// Precision of a curve's log odds about none: they reach 12 from nothing lost to all.
+/// Prior precision of a curve's log odds about zero; they span 12 from nothing lost to everything.
 const CURVE_PRECISION: f64 = 0.05;
 
-/// Nats by which a beginning must do better than the same step without one: twenty to one.
+/// Nats by which a step that begins mid-session must beat the same step without a start: twenty to one.
 const CLEARLY: f64 = 3.0;
 
-/// Information below this decides nothing, nats.
+/// Information below this is ignored, nats.
 const NO_SAY: f64 = 1e-6;
 
-/// Losses as they are judged: log odds over what is lost everywhere.
+/// Losses to be judged: log odds above the share lost everywhere.
 pub struct Losses<'a> {
     pub views: &'a [Vec<Cell<'a>>],
-    /// What earlier findings explain is taken out.
+    /// Log odds left once earlier findings are subtracted.
     pub left: Vec<Vec<f64>>,
     pub base: f64,
     whiteners: Vec<Whitener>,
 }
 
-/// When the views were taken, s of the session.
+/// Times of the views since the start of the session, s.
 pub fn times(views: &[Vec<Cell<'_>>]) -> impl Iterator<Item = f64> {
     views.iter().filter_map(|v| v.first()).map(|c| c.place.session_s)
 }
 
-/// How well a shape predicts the views it was not fitted to.
+/// A shape, and how well it predicts views it was not fitted to.
 #[derive(Debug, Clone)]
 pub struct Judged {
     pub shape: Shape,
-    /// Nats, all views.
+    /// Gain over all views, nats.
     pub gain: f64,
     pub coefficients: Vec<f64>,
 }
 
-/// A step's column in all views, with its information and score there.
+/// A step's column and information in each view.
 struct Column {
     step: Step,
     by_view: Vec<Vec<f32>>,
@@ -61,8 +61,8 @@ impl Column {
     }
 }
 
-/// A step's nats and size, by its information and score in every view: each view is predicted from
-/// the others and from the whole step.
+/// Gain (nats) and size of a step from its information and score in each view. Each view is predicted from
+/// the others and a prior at the whole step.
 pub fn predicted(a: &[f64], b: &[f64]) -> (f64, f64) {
     let (sum_a, sum_b): (f64, f64) = (a.iter().sum(), b.iter().sum());
     let size = |a: f64, b: f64| ((b + STEP_PRECISION) / (a + STEP_PRECISION)).max(0.0);
@@ -73,10 +73,10 @@ pub fn predicted(a: &[f64], b: &[f64]) -> (f64, f64) {
     (total.sum(), size(sum_a, sum_b))
 }
 
-/// Where a tenth of all is lost in most places, the best places show what is lost anyway.
+/// Median share lost from which only the best cells show what is lost anyway.
 const MUCH: f64 = 0.1;
 
-/// Log odds of what is lost everywhere.
+/// Log odds of the share lost everywhere.
 fn usual(odds: &[Vec<f64>]) -> f64 {
     let mut all: Vec<f64> = odds.iter().flatten().copied().collect();
     all.sort_by(f64::total_cmp);
@@ -84,7 +84,7 @@ fn usual(odds: &[Vec<f64>]) -> f64 {
     if share(at(0.5)) < MUCH { at(0.5) } else { at(0.1) }
 }
 
-/// In eight sums: in one each addition would wait for the one before.
+/// Dot product in eight sums, so that no addition waits for the one before.
 fn dot(g: &[f32], w: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     for (g, w) in g.chunks(sums.len()).zip(w.chunks(sums.len())) {
@@ -94,7 +94,7 @@ fn dot(g: &[f32], w: &[f64]) -> f64 {
 }
 
 impl<'a> Losses<'a> {
-    /// `explained` in log odds over the base.
+    /// Subtracts `explained`, which is in log odds above the base.
     pub fn new(views: &'a [Vec<Cell<'a>>], explained: &[Vec<f64>]) -> Self {
         let left: Vec<Vec<f64>> = views
             .iter()
@@ -110,7 +110,7 @@ impl<'a> Losses<'a> {
         losses
     }
 
-    /// Once more with the scatter that `best` leaves, and no less than `min_scatter`.
+    /// Re-estimates the scatter from what `best` leaves, bounded below by `min_scatter`.
     pub fn scattered_as_left_by(self, best: &Judged, min_scatter: Scatter) -> Self {
         let explained = self.explained(best);
         let mut left = self.left.clone();
@@ -120,7 +120,7 @@ impl<'a> Losses<'a> {
         Losses { whiteners, ..self }
     }
 
-    /// Log odds that a shape adds.
+    /// Log odds that a shape adds to each cell.
     pub fn explained(&self, judged: &Judged) -> Vec<Vec<f64>> {
         let size = &judged.coefficients;
         let views = self.views.iter();
@@ -140,7 +140,7 @@ impl<'a> Losses<'a> {
             g.iter().zip(w.solve(g)).map(|(g, w)| g * w).sum::<f64>()
         };
         let a: Vec<f64> = columns.iter().zip(&self.whiteners).map(information).collect();
-        // Views that the step leaves alone have no say.
+        // Views that the step does not affect are left empty.
         let narrow = |(g, a): (&Vec<f64>, &f64)| {
             g.iter().take(if *a > NO_SAY { g.len() } else { 0 }).map(|h| *h as f32).collect()
         };
@@ -148,8 +148,8 @@ impl<'a> Losses<'a> {
         Column { step, by_view, a }
     }
 
-    /// Nats that are left of it without the one view that it needs most. A view and its twin differ by where
-    /// their clumps of losses happen to lie: one in a corner of the steepest view is no law of the tilt.
+    /// Gain left without the view it depends on most, nats. A view and its twin differ in where clumps of
+    /// losses happen to lie: one clump in a corner of the steepest view is no law of the tilt.
     pub fn beyond_one_view(&self, judged: &Judged) -> f64 {
         let without: Box<dyn Fn(usize) -> f64> = match &judged.shape {
             Shape::Step(step) => {
@@ -177,12 +177,12 @@ impl<'a> Losses<'a> {
         (column.a, scores)
     }
 
-    /// Every view's log odds by the inverse of their covariance.
+    /// Multiplies each view's log odds by the inverse of their covariance.
     fn solve(&self, y: &[Vec<f64>]) -> Vec<Vec<f64>> {
         self.whiteners.iter().zip(y).map(|(w, y)| w.solve(y)).collect()
     }
 
-    /// Do both halves of the views lose by this shape?
+    /// Whether both halves of the views lose by this shape.
     pub fn replicate(&self, judged: &Judged, second: &[bool]) -> Option<bool> {
         match &judged.shape {
             Shape::Step(step) => {
@@ -200,8 +200,8 @@ impl<'a> Losses<'a> {
         }
     }
 
-    /// The step `won`, where it is always there, begun in the midst of the session: if that does clearly
-    /// better, with views whose scatter is not trusted below what is usual.
+    /// Returns the constant step `won` with a start mid-session, if that does clearly better. The scatter of
+    /// the views is then not trusted below the usual.
     pub fn later(&self, won: &Judged) -> Option<Judged> {
         let Shape::Step(always @ Step { since_s: None, .. }) = won.shape else { return None };
         let (left, whiteners) = (self.left.clone(), Vec::new());
@@ -229,7 +229,7 @@ impl<'a> Losses<'a> {
         (0..self.views.len()).map(of).collect()
     }
 
-    /// All shapes on these losses, and what noise alone would have brought the best of them.
+    /// Judges all shapes on these losses, and simulates the largest gain that noise alone brings.
     pub fn judge(
         &self,
         steps: &[Step],
@@ -269,15 +269,15 @@ impl<'a> Losses<'a> {
         (judged, NoiseGains::simulated(REPLICATES, MIN_EXCESS_OF_LOSSES, draw))
     }
 
-    /// The farthest (for what is lost below: the nearest) whole step that is seen with 80 % power.
+    /// Farthest whole steps detected with 80 % power; nearest, for losses below them.
     pub fn detectable(&self, steps: &[Step], threshold: f64) -> Vec<Step> {
-        // A gain of half the information, give or take its root.
+        // The gain has mean a / 2 and standard deviation sqrt(a).
         let seen = |s: &&Step| {
             let a: f64 = self.column(**s).a.iter().sum();
             s.share == 1.0 && !s.incidence && 0.5 * a - POWER_80 * a.sqrt() > threshold
         };
         let mut all: Vec<Step> = steps.iter().filter(seen).copied().collect();
-        // The least demanding first: largest middle, or the smallest where what is below is lost.
+        // Least demanding first: the largest middle, or the smallest where losses lie below.
         all.sort_by(|a, b| (b.middle * b.width.signum()).total_cmp(&(a.middle * a.width.signum())));
         let mut best: Vec<Step> = Vec::new();
         for s in all {
@@ -289,7 +289,7 @@ impl<'a> Losses<'a> {
     }
 }
 
-/// Simulations of the null.
+/// Simulations of the null distribution.
 const REPLICATES: u64 = 300;
 /// Minimum mean excess of the noise's gains over their 90 % quantile, nats.
 pub const MIN_EXCESS_OF_LOSSES: f64 = 1.0;

@@ -1,4 +1,4 @@
-//! What losses may follow: steps on lawful axes, which have a name, and curves, which have none.
+//! Shapes that losses may follow: steps in range or tilt, which have names, and nameless curves.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,16 +8,16 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::effects::logistic;
 use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, PixelContext, corner_radius};
 
-/// Beyond `middle` a share is lost; a negative width loses what is below it.
+/// A step beyond whose `middle` a share is lost. A negative width loses what is below it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     pub axis: Axis,
     pub middle: f64,
     pub width: f64,
     pub share: f64,
-    /// It is there from this time of the session on, s; `None`: throughout.
+    /// Time of the session from which it is present, s; `None` if throughout.
     pub since_s: Option<f64>,
-    /// A step over the tilt goes with the angle at which each pixel sees the target, not with that of the plane.
+    /// Whether a step in tilt follows the angle of incidence at each pixel instead of the plane's tilt.
     pub incidence: bool,
 }
 
@@ -26,12 +26,12 @@ impl Step {
         if self.axis == Axis::Theta { "grazing-dropout" } else { "range-dropout" }
     }
 
-    /// A share of one, at all times.
+    /// Step of share 1, present at all times.
     pub fn whole(axis: Axis, middle: f64, width: f64) -> Self {
         Step { axis, middle, width, share: 1.0, since_s: None, incidence: false }
     }
 
-    /// By the effect's parameters; the share is one where none is given.
+    /// Step with an effect's parameters; the share is 1 where none is given.
     pub fn of(effect: &str, value: impl Fn(&str) -> Option<f64>) -> Option<Self> {
         let step = match effect {
             "grazing-dropout" => Step::whole(
@@ -45,18 +45,18 @@ impl Step {
         Some(Step { share: value("share").unwrap_or(1.0), ..step })
     }
 
-    /// What is known to be lost over distance or tilt.
+    /// Steps over distance or tilt that are known already.
     pub fn known(known: &KnownTerms) -> Vec<Self> {
         let of = |id| Step::of(id, |name| known.parameter(id, name));
         ["range-dropout", "grazing-dropout"].into_iter().filter_map(of).collect()
     }
 
-    /// It is not there yet.
+    /// Whether it has not begun yet.
     pub fn before(&self, session_s: f64) -> bool {
         self.since_s.is_some_and(|since| session_s < since)
     }
 
-    /// What its choice among the beginnings costs, and of the other angle, nats.
+    /// Cost of choosing among the starts, and of the choice of angle, nats.
     pub fn cost(&self) -> f64 {
         let of_angle = if self.incidence { 2f64.ln() } else { 0.0 };
         of_angle + self.since_s.map_or(0.0, |_| (STARTS as f64).ln())
@@ -70,26 +70,26 @@ impl Step {
         }
     }
 
-    /// Chance of a loss where the axis is at `x` and `base` is lost anyway.
+    /// Probability of a loss at `x` on the axis, where `base` is lost anyway.
     pub fn loss(&self, x: f64, base: f64) -> f64 {
         base + (1.0 - base) * self.share * logistic(x - self.middle, self.width)
     }
 
-    /// Log odds that it adds.
+    /// Log odds that it adds to each cell.
     pub fn column(&self, cells: &[Cell<'_>], base: f64) -> Vec<f64> {
         let of = |c: &Cell<'_>| odds(self.loss(self.at(c.place), base)) - odds(base);
         cells.iter().map(|c| if self.before(c.place.session_s) { 0.0 } else { of(c) }).collect()
     }
 }
 
-/// Between the line of sight and the target's normal, rad.
+/// Angle between the line of sight and the target's normal, rad.
 fn incidence(p: &PixelContext) -> f64 {
     let ((sin, cos), (down, along)) = (p.theta.sin_cos(), p.azimuth.sin_cos());
     let facing = cos - sin * (along * p.x + down * p.y);
     (facing / (1.0 + p.x * p.x + p.y * p.y).sqrt()).clamp(0.0, 1.0).acos()
 }
 
-/// What may explain losses.
+/// A shape that may explain losses.
 #[derive(Debug, Clone)]
 pub enum Shape {
     Step(Step),
@@ -111,12 +111,12 @@ impl Shape {
         }
     }
 
-    /// Does it go with the angle at which each pixel sees the target?
+    /// Whether it follows the angle of incidence at each pixel.
     pub fn by_incidence(&self) -> bool {
         matches!(self, Shape::Step(Step { incidence: true, .. }))
     }
 
-    /// When it begins, where that is in the midst of the session, s after the first view.
+    /// Start, s after the first view, if it begins mid-session.
     pub fn since_s(&self) -> Option<f64> {
         match self {
             Shape::Step(step) => step.since_s,
@@ -125,21 +125,21 @@ impl Shape {
     }
 }
 
-/// Places tried for the middle of a step, over the axis's reach.
+/// Middles tried for a step, over the axis's reach.
 const MIDDLES: usize = 24;
-/// Widths tried: degrees, and shares of the middle.
+/// Widths tried: in degrees, and as shares of the middle.
 const WIDTHS_DEG: [f64; 3] = [1.0, 2.0, 4.0];
 const WIDTHS: [f64; 3] = [0.015, 0.03, 0.06];
-/// Smaller reaches tell nothing of an axis: rad, and share of z.
+/// Least reach that shows anything of an axis: rad, and ratio of depths.
 const MIN_TILT: f64 = 0.1;
 const MIN_RANGE: f64 = 1.1;
 
-/// All steps on lawful axes.
+/// All steps in range or tilt.
 fn steps(reach: &Extent, camera: &Camera) -> Vec<Step> {
     grid(reach, camera, &WIDTHS_DEG, &WIDTHS, &[1.0, 0.3])
 }
 
-/// Whole steps of the middle width.
+/// Whole steps (share 1) of the middle width.
 fn usual_steps(reach: &Extent, camera: &Camera) -> Vec<Step> {
     grid(reach, camera, &WIDTHS_DEG[1..2], &WIDTHS[1..2], &[1.0])
 }
@@ -162,7 +162,7 @@ fn grid(
             let step = |deg: &f64| Step::whole(Axis::Theta, middle, deg.to_radians());
             widths_deg.iter().for_each(|deg| add(step(deg)));
         }
-        // The corner of the picture sees a plane that is turned away from it so much more steeply.
+        // The corner of the picture sees a plane turned away from it more steeply by its own ray's angle.
         let steepest = (high + corner_radius(camera).atan()).min(FRAC_PI_2);
         for k in 0..MIDDLES {
             let middle = low + along(k) * (steepest - low);
@@ -183,12 +183,12 @@ fn grid(
     all
 }
 
-/// Views on either side of a beginning: fewer show no rule.
+/// Fewest views on either side of a start.
 const SIDE_VIEWS: usize = 3;
-/// Beginnings tried.
+/// Most starts tried.
 const STARTS: usize = 8;
 
-/// These steps, each begun in the midst of a session with views at these `times`.
+/// Returns these steps, each begun mid-session, for views at these `times`.
 pub fn begun(steps: &[Step], times: impl Iterator<Item = f64>) -> Vec<Step> {
     let mut times: Vec<f64> = times.collect();
     times.sort_by(f64::total_cmp);
@@ -200,13 +200,13 @@ pub fn begun(steps: &[Step], times: impl Iterator<Item = f64>) -> Vec<Step> {
     starts.flat_map(begun).collect()
 }
 
-/// Do views that reach so far tell anything of this axis?
+/// Whether views of this reach tell anything of this axis.
 pub fn is_told_apart(axis: Axis, reach: &Extent) -> bool {
     let ([flattest, steepest], [near, far]) = (reach.theta, reach.z);
     if axis == Axis::Theta { steepest - flattest > MIN_TILT } else { far > MIN_RANGE * near }
 }
 
-/// Curves without a name.
+/// Nameless curves.
 fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let mut all = Vec::new();
@@ -229,23 +229,23 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Basis> {
     all
 }
 
-/// All that is tried.
+/// All shapes that are tried.
 #[derive(Clone)]
 pub struct Shapes {
     pub steps: Vec<Step>,
-    /// Steps that begin in the midst of the session.
+    /// Steps that begin mid-session.
     pub begun: Vec<Step>,
     pub curves: Vec<Basis>,
 }
 
 impl Shapes {
-    /// Of views at these `times`, s of the session.
+    /// Shapes for views at these `times`, s of the session.
     pub fn of(reach: &Extent, camera: &Camera, times: impl Iterator<Item = f64>) -> Self {
         let begun = begun(&usual_steps(reach, camera), times);
         Shapes { steps: steps(reach, camera), begun, curves: curves(camera, reach) }
     }
 
-    /// Those on other axes than these.
+    /// Returns the shapes on other axes than these.
     pub fn beside(&self, taken: &[Axis]) -> Self {
         let mut open = self.clone();
         open.steps.retain(|s| !taken.contains(&s.axis));

@@ -10,8 +10,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 const VIEWS: usize = 14;
 
-/// Cells of views whose pixels are lost by `loss`, and by chance: in some views more than in
-/// others, and in clumps.
+/// Cells of views whose pixels are lost by `loss` and by chance: in some views more than in others, and in
+/// clumps.
 fn session(
     share: f64,
     rng: &mut Stream,
@@ -102,8 +102,8 @@ fn find_beside(
     DropoutSearch { reach: &reach, camera, look, seed }.losses(&seen)
 }
 
-/// Where a matcher fails, whole patches go, and other ones in every run: of the far patches this
-/// `share` loses some.
+/// Loses whole patches, others in every run, as a failing matcher does: a `share` of the patches beyond
+/// `far_m`.
 fn run(none: &[Vec<Patch>], far_m: f64, share: f64, rng: &mut Stream) -> Vec<Vec<Patch>> {
     let mut views = none.to_vec();
     for far in views.iter_mut().flatten().filter(|c| c.place.z > far_m) {
@@ -128,11 +128,12 @@ fn clumps_that_lie_elsewhere_in_another_run_are_no_difference() {
         seen += differ(&run(&none, 2.8, 0.6, &mut rng), &none);
     }
     println!("{alarms} alarms of 20 where both lose alike, {seen} of 20 where one alone loses");
-    // One scatter for all patches makes five alarms. By a chance of .003 each, two are one in 600.
+    // One scatter for all patches gives five alarms. At a level of 0.003 each, two of 20 are one in 600.
     assert!(alarms <= 1 && seen >= 18, "{alarms} {seen}");
 }
 
-/// A clump at the far side of the steepest view is no law, at whatever tilt it begins; what all steep views lose is.
+/// A clump at the far side of the steepest view is no law, wherever the step begins; losses of all steep
+/// views are.
 #[test]
 fn what_one_view_loses_beside_its_twin_is_no_law() {
     let (none, camera) = session(0.0, &mut Seed(2).stream("twins/one"), |_| 0.0);
@@ -154,7 +155,7 @@ fn parameter(finding: &Finding, name: &str) -> [f64; 2] {
     ["value", "std_error"].map(|of| finding.parameters[name][of].as_f64().unwrap())
 }
 
-/// Half is lost at 62 degrees; the background by chance.
+/// Half is lost at 62 degrees; the background is lost by chance.
 #[test]
 fn the_grazing_angle_comes_back() {
     let mut within = 0;
@@ -179,8 +180,8 @@ fn the_grazing_angle_comes_back() {
     assert!(within >= 10, "{within} of 12 within two standard errors");
 }
 
-/// Rises of a Gaussian and of Gompertz, in the units that these have for a width. 90 % of 12 are 11;
-/// 8 or fewer have a chance of 2 %.
+/// Gaussian and Gompertz rises, each in its own unit of width. 90 % of 12 are 11; 8 or fewer have a chance of
+/// 2 %.
 #[test]
 fn the_interval_holds_whatever_the_rise() {
     let normal = |t: f64| 0.5 * statrs::function::erf::erfc(-t / 2f64.sqrt());
@@ -219,7 +220,7 @@ fn what_is_too_near_is_lost_on_the_near_side() {
     assert!(first.interval[0] == 0.0 && (first.interval[1] - 1.12).abs() < 0.08);
 }
 
-/// A driver's limit, with readings that scatter about it by 1 %: a note, and nothing named.
+/// A driver's limit, with readings that scatter about it by 1 %, gives a note and no named finding.
 #[test]
 fn a_hard_end_of_the_range_is_a_note() {
     let mut rng = Seed(6).stream("hard");
@@ -229,7 +230,7 @@ fn a_hard_end_of_the_range_is_a_note() {
     assert!(outcome.notes.len() == 1 && outcome.notes[0].contains("2.2"), "{:?}", outcome.notes);
 }
 
-/// Three views show no rule: that is said, and not that there is none.
+/// Three views cannot show a rule: the outcome says so, and not that there is none.
 #[test]
 fn too_few_views_are_told() {
     let mut rng = Seed(7).stream("few");
@@ -239,7 +240,7 @@ fn too_few_views_are_told() {
     assert!(outcome.notes.iter().any(|n| n.contains("and 3 can be used")), "{:?}", outcome.notes);
 }
 
-/// The same distances lose nothing before.
+/// The same distances lose nothing before 6.5 s.
 #[test]
 fn what_begins_in_the_midst_of_the_session_is_told_with_its_time() {
     for seed in 0..3 {
@@ -257,7 +258,7 @@ fn what_begins_in_the_midst_of_the_session_is_told_with_its_time() {
     }
 }
 
-/// A band of rows has no name, but a place.
+/// A band of rows has no name, but it is located.
 #[test]
 fn rows_that_fail_are_told_by_their_axis() {
     let mut rng = Seed(4).stream("rows");
@@ -268,7 +269,8 @@ fn rows_that_fail_are_told_by_their_axis() {
     assert!(first.interval[0] > 150.0 && first.interval[1] < 330.0, "{:?}", first.interval);
 }
 
-/// Two per cent are lost on average, in clumps, by a factor of e more or less from view to view.
+/// Seeds with a false alarm. 0, 1 or 2 % is lost on average, in clumps, by a factor of e more or less from
+/// view to view.
 fn alarms(seeds: std::ops::Range<u64>) -> Vec<u64> {
     seeds
         .filter(|&seed| {
@@ -285,7 +287,7 @@ fn losses_without_a_cause_are_none() {
     assert_eq!(alarms(0..6), Vec::<u64>::new());
 }
 
-/// False alarms are to be 0.1 % of recordings: two in 200 have a chance of 2 %, three of 0.1 %.
+/// False alarms should occur in 0.1 % of recordings: two in 200 have a chance of 2 %, three of 0.1 %.
 #[test]
 #[ignore = "slow: two hundred recordings"]
 fn losses_without_a_cause_are_none_in_two_hundred() {

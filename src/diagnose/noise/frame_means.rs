@@ -1,4 +1,4 @@
-//! Frames whose means move or jitter as the pixels' noise does not explain.
+//! Frames whose means move or jitter by more than the pixels' noise explains.
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
@@ -10,13 +10,13 @@ use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
 
-/// Motion that is not uniform, and jitter that is no white noise, differ by this share.
+/// Relative error due to motion that is not uniform and jitter that is not white.
 const UNEVEN: f64 = 0.2;
 
-/// Frames that shift as a whole.
+/// Effect id: frames that shift as a whole.
 const JITTERS: &str = "frame-jitter";
 
-/// A target that moves by the same velocity in all views.
+/// A target with the same velocity in all views.
 struct Motion {
     /// Along the optical axis, m/s.
     velocity_mps: f64,
@@ -25,7 +25,7 @@ struct Motion {
 }
 
 impl Motion {
-    /// Mean of the views' velocities by their errors, which are enlarged by how they disagree.
+    /// Mean of the views' velocities weighted by their errors; disagreement enlarges its error.
     fn of(all: &[Jitter], noise: &FrameNoise) -> Option<Self> {
         let known: Vec<(f64, f64)> = all
             .iter()
@@ -47,7 +47,7 @@ impl Motion {
     }
 }
 
-/// The velocity of a target that seems to move, its error, m/s, and the chance of it for one at rest.
+/// Apparent velocity of the target and its standard error, m/s, and the p-value for a target at rest.
 pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f64)> {
     let all: Vec<Jitter> = views.iter().filter_map(|s| s.jitter).collect();
     let Motion { velocity_mps, std_error, p } = Motion::of(&all, &FrameNoise::of(&all))?;
@@ -56,11 +56,11 @@ pub(in crate::diagnose) fn velocity(views: &[Structure]) -> Option<(f64, f64, f6
 
 /// Noise of a frame's mean about the line of its view.
 struct FrameNoise {
-    /// Degrees of freedom of all frames.
+    /// Degrees of freedom of all frames together.
     freedom: f64,
-    /// What all frames scatter by beside what their pixels explain, px^2; negative where they scatter less.
+    /// Variance of all frames beyond what their pixels explain, px^2; negative where they scatter less.
     extra_px2: f64,
-    /// Squared coefficient of variation of the views' own variances about that, beyond chance.
+    /// Squared coefficient of variation of the views' variances about that, beyond chance.
     cv2: f64,
 }
 
@@ -69,7 +69,7 @@ impl FrameNoise {
         let freedom: f64 = all.iter().map(|j| j.freedom).sum();
         let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
         let mut noise = FrameNoise { freedom, extra_px2: beside / freedom, cv2: 0.0 };
-        // Of r, a ratio with f degrees of freedom, (r - 1)^2 is cv2 (1 + 2 / f) + 2 / f on average.
+        // For a ratio r with f degrees of freedom, (r - 1)^2 averages cv2 (1 + 2 / f) + 2 / f.
         let off = |j: &Jitter| {
             let by_chance = 2.0 / j.freedom;
             ((noise.ratio(j) - 1.0).powi(2) - by_chance) / (1.0 + by_chance)
@@ -80,7 +80,7 @@ impl FrameNoise {
         noise
     }
 
-    /// What a view's own frames scatter by, over what is expected.
+    /// Scatter of a view's own frames over the expected.
     fn ratio(&self, view: &Jitter) -> f64 {
         view.scatter_px2 / (view.freedom * self.px2(view))
     }
@@ -89,18 +89,18 @@ impl FrameNoise {
         (view.expected_px2 + self.extra_px2.max(0.0)).max(f64::MIN_POSITIVE)
     }
 
-    /// As its own frames scatter, so far as views differ (a moderated variance: Smyth 2004, his prior by
-    /// its moments); no less than all do, for few frames may lie on a line by chance.
+    /// Variance of a view, moderated (Smyth 2004, the prior by its moments): its own frames count as far as
+    /// views differ. At least that of all, as few frames may lie on a line by chance.
     fn own_px2(&self, view: &Jitter) -> f64 {
-        // Inverse gamma variances of d degrees of freedom have cv2 = 2 / (d - 4), and their mean counts
-        // d - 2 times.
+        // Inverse gamma variances of d degrees of freedom have cv2 = 2 / (d - 4), and
+        // their mean has weight d - 2.
         let others = 2.0 * (1.0 + self.cv2);
         let own = self.cv2 * view.freedom;
         self.px2(view) * ((others + own * self.ratio(view)) / (others + own)).max(1.0)
     }
 }
 
-/// What the frames' means tell; `rho` is the correlation of successive frames that was found.
+/// Tests the frames' means; `rho` is the correlation found between successive frames.
 pub(in crate::diagnose) fn frame_means(
     views: &[Structure],
     known: &KnownTerms,
@@ -123,21 +123,21 @@ pub(in crate::diagnose) fn frame_means(
     found
 }
 
-/// What jitter moves frames by, px^2: as was found, or as is known.
+/// Variance of the frame jitter, px^2: as found, or else as known.
 pub fn jitter_px2(found: &[TextureFinding], known: &KnownTerms) -> f64 {
     let jitter = found.iter().find(|f| f.families.contains(&JITTERS));
     let found = jitter.and_then(|f| f.parameters["sigma_px"]["value"].as_f64());
     found.or_else(|| known.parameter(JITTERS, "sigma_px")).unwrap_or(0.0).powi(2)
 }
 
-/// Motion: the line explains more than the scatter about it does, or all views move alike.
+/// Tests for motion: the line explains more than the scatter about it, or all views move alike.
 fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<TextureFinding> {
     let n = all.len() as f64;
     let by_noise =
         |of: &dyn Fn(&Jitter) -> f64| all.iter().map(|j| of(j) / noise.px2(j)).sum::<f64>();
     let line = by_noise(&|j| j.trend_px2) / n;
     let about_it = (by_noise(&|j| j.scatter_px2) / noise.freedom).max(1.0);
-    // Frames that resemble their neighbours wander.
+    // Frames correlated with their neighbours drift.
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
     let f = line / (about_it * wander * wander);
     let p_line = FisherSnedecor::new(n, noise.freedom).map_or(1.0, |d| d.sf(f));
@@ -156,14 +156,14 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
     Some(TextureFinding {
         parameters: one("velocity_mps", velocity_mps, std_error),
         p: p.max(1e-300),
-        // As a term's: what the lines explain of the squares.
+        // As for a term: the squares that the lines explain.
         nats: 0.5 * n * line,
         ..TextureFinding::named(vec!["target-motion"], Statistic::Bias, Axis::Frame)
     })
 }
 
-/// Jitter: the means scatter as neither their pixels' noise, `variance_px2` a pixel, nor the jitter that is
-/// known explains.
+/// Tests for jitter: the means scatter by more than their pixels' noise and the known jitter explain.
+/// `variance_px2` is the variance of a pixel.
 fn jitter(
     all: &[Jitter],
     noise: &FrameNoise,
@@ -177,7 +177,7 @@ fn jitter(
         expected: j.expected_px2 + known_px2,
     });
     let Excess { p, nats, .. } = Excess::of(beside, level)?;
-    // All of it, as a model has it.
+    // The total, as in a model.
     let sigma = noise.extra_px2.sqrt();
     let error = UNEVEN.hypot(1.0 / (2.0 * noise.freedom).sqrt());
     Some(TextureFinding {
@@ -200,15 +200,15 @@ mod tests {
         StandardNormal.sample(rng)
     }
 
-    /// m/s.
+    /// Velocity found, m/s.
     fn velocity(views: &[Structure]) -> Option<f64> {
         let found = frame_means(views, &KnownTerms::default(), 1e-3, 0.0);
         let motion = found.iter().find(|h| h.families == ["target-motion"])?;
         motion.parameters["velocity_mps"]["value"].as_f64()
     }
 
-    /// Frames that jitter, about a line through four of them: two degrees of freedom a view leave some view
-    /// that lies on its line by chance, and it must not decide for all. A true motion is told.
+    /// Frames that jitter about a line through four of them: with two degrees of freedom per view, some view
+    /// lies on its line by chance and must not decide for all. A true motion is found.
     #[test]
     fn frames_that_jitter_do_not_move() {
         // At 2 m.
@@ -241,8 +241,8 @@ mod tests {
         assert!((0..20).all(|seed| told(seed, 0.05)));
     }
 
-    /// Views that scatter alike are believed to: by each one's own two degrees of freedom, if that is more,
-    /// they would scatter by 1 + 1/e. A view that is truly restless is taken for it.
+    /// Views that scatter alike get the common variance: with each one's own, of two degrees of freedom,
+    /// where that is larger, it would be 1 + 1/e. A view that truly scatters more gets its own.
     #[test]
     fn a_view_counts_by_its_own_frames_as_far_as_views_differ() {
         let mut rng = Seed(11).stream("frame-means/moderated");
@@ -264,7 +264,7 @@ mod tests {
         assert!((15.0..60.0).contains(&own), "{own}");
     }
 
-    /// Far, steep views have noisy means: a motion that the near ones see is no less sure for them.
+    /// Far, tilted views have noisy means; they do not weaken a motion that the near ones show.
     #[test]
     fn views_count_by_their_own_noise() {
         let mut rng = Seed(9).stream("motion/uneven");

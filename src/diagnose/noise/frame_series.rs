@@ -1,42 +1,42 @@
-//! What a view's frames measure one after the other, as a line in time and the scatter about it.
+//! Time series of a view's frames: a line in time and the scatter about it.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::diagnose::views::field::{CLIP_SIGMAS, Field};
 use crate::solve::plane_equations;
 
-/// Frames scatter by this factor more before it is told: what pixels share beyond a window's reach is not in their
-/// noise, and heavy tails double what the size of it scatters by.
+/// Factor by which the variance must exceed that of the noise, which lacks correlation beyond a window's
+/// reach; heavy tails double the scatter of its size.
 const MUCH: f64 = 2.0;
 
-/// Squares that values of one view scatter by.
+/// Sum of squares of the values of one view.
 #[derive(Debug, Clone, Copy)]
 pub struct Squares {
     pub sum: f64,
     pub freedom: f64,
-    /// What noise lets one expect for the sum over the freedom.
+    /// Sum over freedom expected from noise.
     pub expected: f64,
 }
 
 impl Squares {
-    /// Per degree of freedom, beyond what is expected.
+    /// Excess over the expected, per degree of freedom.
     pub fn beyond(&self) -> f64 {
         self.sum / self.freedom - self.expected
     }
 }
 
-/// Values that scatter by more than their noise.
+/// Scatter of values beyond their noise.
 pub struct Excess {
-    /// Standard deviation beside the noise, and its standard error.
+    /// Standard deviation beyond the noise, and its standard error.
     pub size: f64,
     pub std_error: f64,
-    /// Chance of it for noise twice as large as is known.
+    /// P-value for noise of twice the known variance.
     pub p: f64,
     pub nats: f64,
 }
 
 impl Excess {
-    /// Of all views together, at this level.
+    /// Tests all views together at this level.
     pub fn of(views: impl Iterator<Item = Squares>, level: f64) -> Option<Self> {
         let (mut ratio, mut freedom, mut beyond) = (0.0, 0.0, 0.0);
         for s in views {
@@ -55,17 +55,17 @@ impl Excess {
     }
 }
 
-/// A line through values in time.
+/// A line fitted to values in time.
 pub struct AboutLine {
-    /// Sums of squares about the line, and of what it explains.
+    /// Sums of squares about the line, and explained by it.
     pub scatter: f64,
     pub trend: f64,
-    /// Of the values, a second.
+    /// Change of the values per second.
     pub slope: f64,
 }
 
 impl AboutLine {
-    /// Of (time, value), three or more.
+    /// Fits (time, value) pairs; `None` with fewer than three.
     pub fn of(series: &[(f64, f64)]) -> Option<Self> {
         let n = series.len() as f64;
         let (t0, x0) = series.iter().fold((0.0, 0.0), |(t, x), s| (t + s.0 / n, x + s.1 / n));
@@ -81,22 +81,22 @@ impl AboutLine {
     }
 }
 
-/// Frame by frame, the mean residual of the target.
+/// Mean residual of the target, frame by frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Jitter {
     /// Sum of squares about the line, px^2, and its degrees of freedom.
     pub scatter_px2: f64,
     pub freedom: f64,
-    /// What the pixels' own noise lets one expect for scatter / freedom, px^2.
+    /// Scatter / freedom expected from the pixels' own noise, px^2.
     pub expected_px2: f64,
-    /// Sum of squares that the line explains, px^2.
+    /// Sum of squares explained by the line, px^2.
     pub trend_px2: f64,
     /// Velocity along the optical axis, m/s.
     pub velocity_mps: f64,
 }
 
 impl Jitter {
-    /// How the frames' means move, where their pixels' noise lets one expect `expected_px2` of each.
+    /// Motion of the frames' means; `expected_px2` is the variance of each from its pixels' noise.
     pub fn of(field: &Field, expected_px2: f64) -> Option<Self> {
         let frames: Vec<(f64, f64)> =
             field.frames.iter().copied().filter(|f| f.1.is_finite()).collect();
@@ -117,12 +117,12 @@ impl Jitter {
 }
 
 impl Squares {
-    /// How the slopes of a view's frames scatter about a line in time, along both axes of the picture together: px^2
-    /// at one standard deviation of the target's pixels from its middle.
+    /// Scatter of the slopes of a view's frames about a line in time, over both axes of the picture: px^2 at
+    /// one standard deviation of the target's pixels from its centre.
     ///
-    /// Of the frames that are kept; `mean_px2` is what a frame's mean errs by. `None` with fewer than three, of
-    /// which those that lost many pixels are none. Where the noise is larger far from the middle, as on a tilted
-    /// target, slopes err by more.
+    /// Uses the frames kept; `mean_px2` is the variance of a frame's mean. `None` with fewer than three, not
+    /// counting those that lost many pixels. The error of the slopes is larger where the noise grows away
+    /// from the centre, as on a tilted target.
     pub fn of_slopes(field: &Field, mean_px2: f64) -> Option<Self> {
         let axes = axes(field)?;
         let slopes = field.first.iter().map(|r| slopes(field, r, &axes));
@@ -145,7 +145,7 @@ impl Squares {
     }
 }
 
-/// Places of the target's pixels along two axes, uncorrelated and of unit variance.
+/// Positions of the target's pixels along two axes, uncorrelated and of unit variance.
 fn axes(field: &Field) -> Option<Vec<[f64; 2]>> {
     let n = field.pixels.len() as f64;
     let width = field.width as u32;
@@ -167,16 +167,16 @@ fn axes(field: &Field) -> Option<Vec<[f64; 2]>> {
     Some(all)
 }
 
-/// A frame with a smaller share of the pixels that others have errs by more than they do.
+/// Least share of the measured pixels: with fewer, a frame's error is larger than the others'.
 const MIN_SHARE: f64 = 0.8;
 
-/// How many pixels of a frame are looked at, and the slopes of their residuals, px at one standard deviation from
-/// the middle.
+/// Number of pixels used of a frame, and the slopes of their residuals, px at one standard
+/// deviation from the centre.
 fn slopes(field: &Field, residuals: &[f32], axes: &[[f64; 2]]) -> (f64, [f64; 2]) {
     let pixels = residuals.iter().zip(axes).zip(&field.sigma);
     let seen = pixels.filter(|((e, _), sigma)| e.abs() <= CLIP_SIGMAS * sigma.max(field.spread_px));
     let (a, b) = plane_equations(seen.map(|((&e, at), _)| (*at, f64::from(e), 1.0)));
     let n = a[(0, 0)];
-    // Pixels that are lost move the middle.
+    // Lost pixels shift the centre.
     (n, [1, 2].map(|axis| (b[axis] - a[(0, axis)] * b[0] / n) / n))
 }

@@ -1,4 +1,4 @@
-//! Frames whose slope over the picture changes as the pixels' noise does not explain.
+//! Frames whose slope over the picture changes by more than the pixels' noise explains.
 
 use super::frame_series::{Excess, Squares};
 use super::structure::Structure;
@@ -7,7 +7,7 @@ use super::view_mean::variance_px2;
 use crate::diagnose::finding::parameters::one;
 use crate::terms::{Axis, Statistic};
 
-/// Slopes that scatter as neither noise nor what moves the frames' means by `jitter_px2` explains.
+/// Tests whether slopes scatter by more than noise and a jitter of the frames' means of `jitter_px2` explain.
 pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<TextureFinding> {
     let tilts = views.iter().filter_map(|s| s.tilts);
     let beside = tilts.map(|t| Squares { expected: t.expected + jitter_px2, ..t });
@@ -34,8 +34,9 @@ mod tests {
     const SIZE: [usize; 2] = [60, 40];
     const NOISE_PX: f64 = 0.05;
 
-    /// Forty views of four frames each, whose noise is five times as large on the outer tenths to the left and right,
-    /// and that slope by so much, px from the middle to one standard deviation of the places.
+    /// Forty views of four frames each. The noise is five times as large in the outer tenths left
+    /// and right; the slopes have this standard deviation, px from the centre to one standard
+    /// deviation of the positions.
     fn views(slope_px: f64) -> Vec<Structure> {
         let mut rng = Seed(8).stream("frame-tilts");
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -66,8 +67,8 @@ mod tests {
         (0..40).map(view).collect()
     }
 
-    /// Slopes err as is expected of them, which is 1.6 times what the mean of the picture's noise would make: the ratio
-    /// of 160 degrees of freedom is 1 to 0.11.
+    /// Slopes scatter as expected, by 1.6 times what the mean noise of the picture would give: the ratio of
+    /// 160 degrees of freedom is 1 +- 0.11.
     #[test]
     fn slopes_are_found_with_their_size_and_noise_has_none() {
         let still = views(0.0);
@@ -76,7 +77,7 @@ mod tests {
         assert!((mean - 1.0).abs() < 0.35, "{mean}");
         assert!(frame_tilts(&still, 0.0, 1e-3).is_none());
         let found = frame_tilts(&views(0.01), 0.0, 1e-3).expect("slopes");
-        // One of two axes has it: a half of the squares.
+        // One of the two axes has it: half of the squares.
         let told = found.parameters["sigma_px"]["value"].as_f64().unwrap();
         assert!((told / (0.01 / 2f64.sqrt()) - 1.0).abs() < 0.3, "{told}");
         // No more than what shifts the frames.

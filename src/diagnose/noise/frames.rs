@@ -1,5 +1,5 @@
-//! Frames that are noisier than the others of their view: one in all views, as where an exposure has not settled, or
-//! now this one and now that, as under a lamp that flickers.
+//! Frames noisier than the others of their view: the same one in all views, as where an exposure has not
+//! settled, or now one and now another, as under a flickering lamp.
 
 use serde_json::json;
 
@@ -12,12 +12,12 @@ use crate::diagnose::options::FRAMES_KEPT;
 use crate::stats::Correlation;
 use crate::terms::{Axis, Statistic};
 
-/// The frame that stands out most in all views.
+/// Tests the frame whose noise differs most from the others' over all views.
 pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
     let (frame, m, p) = (0..FRAMES_KEPT)
         .filter_map(|j| {
             let m = ViewMean::of(views, |s| s.frame_log_variance[j])?;
-            // Either way, and any of the frames.
+            // Two-sided, and any of the frames.
             let p = 2.0 * m.p_above(0.0).min(m.p_below(0.0));
             Some((j, m, (p * FRAMES_KEPT as f64).min(1.0)))
         })
@@ -38,12 +38,13 @@ pub fn unequal(views: &[Structure], level: f64) -> Option<TextureFinding> {
     })
 }
 
-/// Frames that are now noisier and now quieter than chance has it, by what their logarithms scatter.
+/// Tests whether the noise varies between frames by more than chance, from the scatter of its logarithm.
 pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
     let squares = |s: &Structure| {
         let logs: Vec<f64> = s.frame_log_variance.iter().flatten().copied().collect();
         let (n, [_, of_rows]) = (logs.len() as f64, s.excess_of_rows(&Correlation::white()));
-        // Each frame's logarithm is over the mean of the others': n / (n - 1) of what it is off their common mean.
+        // Each logarithm is relative to the mean of the others: n / (n - 1) times the
+        // deviation from the common mean.
         let sum: f64 = logs.iter().map(|x| (x * (n - 1.0) / n).powi(2)).sum();
         let expected = 2.0 * s.repeats() * of_rows / s.frame_pixels;
         let measured = n > 1.0 && expected.is_finite();
@@ -71,8 +72,8 @@ mod tests {
     use crate::diagnose::noise::texture::frame_log_variance;
     use crate::rng::{Seed, Stream};
 
-    /// Twelve views of four frames, 5000 pixels each, whose noise is `size` times a frame; a share of the readings is
-    /// lost.
+    /// Twelve views of four frames of 5000 pixels, with noise of `size` per frame; the share `lost` of
+    /// the readings is missing.
     fn views(seed: u64, lost: f64, size: impl Fn(usize, &mut Stream) -> f64) -> Vec<Structure> {
         let mut rng = Seed(seed).stream("frames");
         let mut frame = |k: usize| -> Vec<f32> {
@@ -102,12 +103,12 @@ mod tests {
         StandardNormal.sample(rng)
     }
 
-    /// Each frame is louder or quieter by a Gaussian of this size in the logarithm of its standard deviation.
+    /// The log standard deviation of each frame varies as a Gaussian of this standard deviation.
     fn flickering(seed: u64, by: f64, lost: f64) -> Vec<Structure> {
         views(seed, lost, |_, rng| (by * normal(rng)).exp())
     }
 
-    /// The variance's logarithm changes by twice as much as that of the standard deviation, to 1 / sqrt(2 * 36).
+    /// The log variance varies twice as much as the log standard deviation; known to 1 / sqrt(2 * 36).
     #[test]
     fn frames_that_flicker_are_told_with_their_size_and_others_are_not() {
         let found = flicker(&flickering(1, 0.1, 0.3), 1e-3).expect("flicker");

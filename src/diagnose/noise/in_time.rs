@@ -1,4 +1,4 @@
-//! What pixels repeat: in every view, in every frame of a view, and from frame to frame.
+//! Errors that pixels repeat: in every view, in every frame of a view, and from frame to frame.
 
 use super::structure::Structure;
 use super::texture_finding::{Shared, TextureFinding};
@@ -7,16 +7,16 @@ use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
 
-/// Pixels that err by a constant each.
+/// Effect id: a constant error of each pixel.
 pub const FIXED_PATTERN: &str = "fixed-pattern-noise";
-/// Share of the variance that pixels repeat in every view, worth a word.
+/// Least share of the variance repeated in every view that is worth reporting.
 const MIN_FIXED: f64 = 0.0003;
-/// Below this chance a fall of the correlation is not put down to noise alone.
+/// P-value below which a fall of the correlation is not attributed to noise alone.
 const DOUBTFUL: f64 = 0.05;
-/// A share that stands still beside one that changes slowly is known to this.
+/// Error of a constant share beside one that changes slowly.
 const BESIDE_ANOTHER: f64 = 0.05;
 
-/// A correlation of frames: a share of the variance.
+/// Finding of a correlation of frames: a share of the variance.
 fn of_frames(
     families: Vec<&'static str>,
     interval: [f64; 2],
@@ -48,13 +48,14 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     };
     let found = fixed.and_then(|m| pattern.found(&m, variance, level));
     let mut found: Vec<TextureFinding> = found.map(|f| of_pixels(f, views)).into_iter().collect();
-    // What the pattern errs by is in every view's correlation alike.
+    // The pattern's error is common to the correlations of all views.
     let of_pattern = fixed.map_or(0.0, |m| m.std_error * mean_precision(views));
     found.extend(beside(&beside_pattern(views, fixed), of_pattern, known, level));
     found
 }
 
-/// A pattern's standard deviation errs as that of a sample of its pixels, too: small views lie within large ones.
+/// Adds the sampling error of a pattern's standard deviation over its pixels; small
+/// views lie within large ones.
 fn of_pixels(mut found: TextureFinding, views: &[Structure]) -> TextureFinding {
     let pixels = ViewMean::common_size(views, |s| s.still.fixed_pixels);
     let told = |key: &str| found.parameters["sigma_px"][key].as_f64().unwrap_or(0.0);
@@ -63,7 +64,7 @@ fn of_pixels(mut found: TextureFinding, views: &[Structure]) -> TextureFinding {
     found
 }
 
-/// What frames of a view share beside the pattern, whose error adds so much to theirs.
+/// Tests what frames of a view share beside the pattern; `of_pattern` is the standard error that it adds.
 fn beside(
     views: &[Structure],
     of_pattern: f64,
@@ -78,7 +79,7 @@ fn beside(
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
     let falling = ViewMean::of(views, |s| Some(s.lagged[0]? - later(s)?));
     let Some((falling, still)) = falling.zip(still_beside(views)) else {
-        // Two frames a view: still or slowly changing, nobody can say.
+        // With two frames per view, constant and slowly changing noise cannot be told apart.
         let p = first.p_above(frozen_known + rho_known);
         let more = first.value - frozen_known - rho_known;
         if p < level {
@@ -89,10 +90,10 @@ fn beside(
         return found;
     };
     let p_falling = falling.p_above(0.0);
-    // What changes slowly makes next frames alike; a fall to frames that differ is chance.
+    // Slowly changing noise makes successive frames alike; a fall from no correlation is chance.
     let alike = first.p_above(frozen_known) < level;
     let slowly = alike && p_falling < level;
-    // What stands still is in the last of them whole, and in all of them where none fades.
+    // Constant noise is whole at the longest lag, and at all lags where nothing fades.
     let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
     let Some(standing) = ViewMean::of(views, last).map(|m| m.and_error(of_pattern)) else {
         return found;
@@ -101,7 +102,7 @@ fn beside(
     let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
     let stands = p_still < level && still - frozen_known > floor;
     if slowly && rho_known == 0.0 {
-        // A share too small to be told is mostly chance, and this very correlation is in its estimate.
+        // A share too small to report is mostly chance, and its estimate contains this very correlation.
         let s = if stands { still } else { frozen_known };
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
         let name = vec!["temporal-correlation"];
@@ -109,7 +110,7 @@ fn beside(
         found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first_error), rho, evidence));
     }
     if stands {
-        // What falls, but not clearly, may as well change slowly.
+        // An uncertain fall may as well be slow change.
         let doubtful = !slowly && p_falling < DOUBTFUL && rho_known == 0.0;
         let names = match doubtful {
             false => vec!["frozen-noise"],
@@ -128,14 +129,13 @@ fn beside(
     found
 }
 
-/// Correlation of frames two or three apart: of four frames two pairs, and one.
+/// Mean correlation of frames two or three apart: of four frames, two pairs and one.
 pub fn later(s: &Structure) -> Option<f64> {
     let (two, three) = (s.lagged[1]?, s.lagged[2]);
     Some(three.map_or(two, |three| (2.0 * two + three) / 3.0))
 }
 
-/// Correlation of any two frames, each pair of them counted once: of four frames three are next to
-/// one another.
+/// Mean correlation of any two frames, each pair counted once: of four frames, three pairs are successive.
 pub fn of_any_two(s: &Structure) -> Option<f64> {
     let next = s.lagged[0]?;
     let Some(rest) = later(s) else { return Some(next) };
@@ -143,35 +143,35 @@ pub fn of_any_two(s: &Structure) -> Option<f64> {
     Some(next + share * (rest - next))
 }
 
-/// Pixels of white noise correlate by chance to one over the root of their number; a few views may
-/// happen to agree better than that.
+/// Standard error of the correlation of white noise: one over the root of the number of pixels. A few views
+/// may happen to agree better.
 fn by_chance(views: &[Structure]) -> f64 {
     let pairs = |s: &Structure| s.pixels * s.lagged.iter().flatten().count() as f64;
     let pairs: f64 = views.iter().map(pairs).sum();
     if pairs > 0.0 { pairs.sqrt().recip() } else { 0.0 }
 }
 
-/// Views with their frames' correlations beside a pattern that is the same in all of them: each view's noise
-/// has its own share of that.
+/// Views with their frames' correlations less those of a pattern common to all views, of which each view's
+/// variance has its own share.
 fn beside_pattern(views: &[Structure], fixed: Option<ViewMean>) -> Vec<Structure> {
     let fixed_px2 = fixed.map_or(0.0, |m| m.value);
     let beside = |s: &Structure| Structure { lagged: s.beside_pattern(fixed_px2), ..s.clone() };
     views.iter().map(beside).collect()
 }
 
-/// Mean of one over the variance, px^-2.
+/// Mean inverse variance, px^-2.
 fn mean_precision(views: &[Structure]) -> f64 {
     let precision = |s: &Structure| (s.variance_px2 > 0.0).then(|| 1.0 / s.variance_px2);
     ViewMean::of(views, precision).map_or(0.0, |m| m.value)
 }
 
-/// Variance of what pixels err by in every view alike, px^2.
+/// Variance of the errors that pixels repeat in every view, px^2.
 pub fn pattern_px2(views: &[Structure]) -> f64 {
     ViewMean::of_pairs(views, |s| s.still.fixed_px2).map_or(0.0, |m| m.value)
 }
 
-/// Share of the noise that stands still within a view and is not in all of them, by the views' mean
-/// correlations; `None` with too few frames.
+/// Share of the noise that is constant within a view but not common to all, by the views' mean correlations;
+/// `None` with too few frames.
 pub fn still_level(views: &[Structure]) -> Option<f64> {
     still_beside(&beside_pattern(views, ViewMean::of_pairs(views, |s| s.still.fixed_px2)))
 }
@@ -181,19 +181,19 @@ fn still_beside(views: &[Structure]) -> Option<f64> {
     Some(still_share(mean(0)?, mean(1)?, mean(2)))
 }
 
-/// The s of c_k = s + (1 - s) rho^k, from the correlations at lags one, two and, where there are frames
-/// enough, three.
+/// Solves c_k = s + (1 - s) rho^k for s, from the correlations at lags one, two and,
+/// with enough frames, three.
 pub(in crate::diagnose) fn still_share(c1: f64, c2: f64, c3: Option<f64>) -> f64 {
     let near = c1 - c2;
     let Some(c3) = c3 else {
-        // rho^2 = rho * rho alone cannot be told from a share: what falls is taken as a filter's.
+        // Two lags alone cannot separate rho from a share: a fall is attributed to a filter.
         return if near > 0.05 * c1 { 0.0 } else { c2 };
     };
     if near <= 0.01 {
         return (c1 + c2 + c3) / 3.0;
     }
     let rho = ((c2 - c3) / near).clamp(0.0, 0.95);
-    // c1 - c2 = (1 - s) rho (1 - rho); a moving average dies at once and leaves the last.
+    // c1 - c2 = (1 - s) rho (1 - rho); a moving average dies out at once and leaves the last.
     let s = if rho < 0.05 { c3 } else { 1.0 - near / (rho * (1.0 - rho)) };
     s.clamp(0.0, c3.max(0.0))
 }
@@ -204,8 +204,7 @@ mod tests {
     use super::*;
     use crate::rng::Seed;
 
-    /// What chance leaves of the later frames is no share that stands still: it would make rho smaller, and
-    /// never larger.
+    /// What chance leaves of the later frames is no constant share: it would make rho smaller, never larger.
     #[test]
     fn a_share_that_is_not_told_has_no_part_in_the_correlation_of_frames() {
         const RHO: f64 = 0.08;
@@ -225,8 +224,8 @@ mod tests {
         assert!(off.len() > 390 && mean.abs() < 1e-3, "{mean} of {}", off.len());
     }
 
-    /// Far views have more noise of their own beside the same pattern: the share that stands still within
-    /// each is 0.1 of that in all of them.
+    /// Far views have more noise of their own beside the same pattern: the constant share within each is 0.1
+    /// of that noise in all of them.
     #[test]
     fn what_stands_still_in_all_views_is_none_of_what_stands_still_in_each() {
         const FRACTION: f64 = 0.1;

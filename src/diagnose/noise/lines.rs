@@ -1,4 +1,4 @@
-//! Whole columns, or rows, that err by a constant each: their profile, as a term of the model.
+//! Constant errors of whole columns or rows: their profile, as a term of the model.
 
 use rayon::prelude::*;
 
@@ -10,23 +10,23 @@ use crate::diagnose::views::field::Field;
 use crate::stats::mean;
 use crate::terms::{Axis, Basis, Coordinate, Modulation, Term};
 
-/// Columns and rows of fewer readings over all views are left at nothing.
+/// Columns and rows with fewer readings over all views get zero.
 const MIN_READINGS: f64 = 200.0;
 
-/// What each column, or each row, errs by.
+/// Constant error of each column, or of each row.
 #[derive(Debug, Clone)]
 pub struct LearntLines {
     pub axis: Axis,
     pub profile: Term,
-    /// Of each coefficient, px^2; nothing of a line that was not seen.
+    /// Variance of each coefficient, px^2; zero for a line that was not seen.
     variances: Vec<f64>,
-    /// Of as many pixels each line is the mean, whatever they err by in every view alike.
+    /// Effective number of pixels averaged in each line, for errors that are the same in every view.
     pixels: Vec<f64>,
 }
 
 impl LearntLines {
-    /// The mean of every column, or of every row, over the views, px, without what is smooth. Each view comes with
-    /// what is known of it to be no noise, px by pixel.
+    /// Mean of every column, or of every row, over the views, px, without what is smooth. Each view comes
+    /// with its known bias, px by pixel.
     pub fn of(views: &[(&Field, &[f32])], axis: Axis) -> Option<Self> {
         let (width, height) = views.first().map(|(f, _)| (f.width, f.height))?;
         let (over, nodes) = match axis {
@@ -37,7 +37,7 @@ impl LearntLines {
             .par_iter()
             .map(|(field, bias)| {
                 let sums = line_sums(&pixel_scale(field, &field.mean, bias), width, axis);
-                // View by view, so that the scatter of the views is that of what is told.
+                // Corrected view by view, so that the scatter of the views is that of the reported profile.
                 let means: Vec<f32> = sums.iter().map(|(sum, n)| (sum / n) as f32).collect();
                 let own = with_own_share(&means).into_iter().map(f64::from).zip(sums);
                 own.map(|(own, (_, n))| if n > 0.0 { (own * n, n) } else { (0.0, 0.0) }).collect()
@@ -51,9 +51,9 @@ impl LearntLines {
         Some(LearntLines { axis, profile: Term::bias(basis, means), variances, pixels })
     }
 
-    /// The finding gets the profile, and is as large as that is: the test looks at what changes from one line to
-    /// the next, of which two read-outs have more than columns that err independently. A pattern of pixels, of
-    /// `pattern_px2`, has means of its own in each line.
+    /// Writes the profile into the finding and scales the finding to it: the test looks at the change from
+    /// one line to the next, which is larger for two read-outs than for columns with independent errors. A
+    /// pattern of pixels, of `pattern_px2`, has means of its own in each line.
     pub fn tell(&self, found: &mut Finding, pattern_px2: f64) {
         let LearntLines { profile, variances, pixels, .. } = self;
         let by_chance = variances.iter().zip(pixels).map(|(v, n)| (v, pattern_px2 / n.max(1.0)));
@@ -73,9 +73,9 @@ impl LearntLines {
     }
 }
 
-/// Of lines from which the mean over boxes of neighbours was taken, as [`pixel_scale`] does: what each had before,
-/// but for what is smooth; NaN of a line that was not seen. A line is part of the mean that it lost: of every second
-/// line an eighth more is left than there was, and a thousandth after these rounds; at the rims, where boxes are
+/// Restores lines from which means over boxes of neighbours were subtracted, as by [`pixel_scale`], except
+/// for what is smooth; NaN for a line that was not seen. A line is part of the mean it lost: an alternating
+/// pattern is left an eighth too large, and a thousandth after these rounds; at the borders, where boxes are
 /// short, a twentieth (simulated).
 fn with_own_share(means: &[f32]) -> Vec<f32> {
     const ROUNDS: usize = 3;
@@ -95,7 +95,7 @@ fn with_own_share(means: &[f32]) -> Vec<f32> {
     values
 }
 
-/// Of how many pixels each line is the mean: those of some views count for less.
+/// Effective number of pixels averaged in each line; pixels seen in few views count less.
 fn pixels_of_lines(views: &[(&Field, &[f32])], width: usize, lines: usize, axis: Axis) -> Vec<f64> {
     let mut seen: Vec<f32> = Vec::new();
     for (field, _) in views {
@@ -109,7 +109,7 @@ fn pixels_of_lines(views: &[(&Field, &[f32])], width: usize, lines: usize, axis:
     sums.iter().zip(&squares).map(of).take(lines).collect()
 }
 
-/// Mean of a line, and its variance with the views as the sample; nothing of too few readings.
+/// Mean of a line, and its variance with the views as the sample; zero with too few readings.
 fn of_line(views: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     let (mut sum, mut n) = (0.0, 0.0);
     views.clone().for_each(|(s, k)| (sum, n) = (sum + s, n + k));

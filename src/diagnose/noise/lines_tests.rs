@@ -1,4 +1,4 @@
-//! Columns that err by a constant each, under noise that is known.
+//! Constant column errors under noise of known size.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -10,7 +10,7 @@ use crate::rng::{Seed, Stream};
 const SIZE: [usize; 2] = [64, 48];
 const NOISE_PX: f64 = 0.04;
 
-/// All of a picture, seen square on.
+/// A view of the whole picture, facing the sensor.
 fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
     let [width, height] = SIZE;
     let n = width * height;
@@ -30,8 +30,8 @@ fn field(rng: &mut Stream, error_px: impl Fn(usize) -> f64) -> Field {
     }
 }
 
-/// Every other column is off by as much as the next is to the other side: nothing of that is
-/// smooth. Five standard errors (0.0013 px) for 176 lines: a chance of 1e-4.
+/// Columns with errors of alternating sign, which have no smooth part. Five standard errors (0.0013 px) for
+/// 176 lines: a chance of 1e-4.
 #[test]
 fn each_column_is_met_and_rows_are_let_be() {
     let error_px = |u: usize| if u.is_multiple_of(2) { 0.05 } else { -0.05 };
@@ -44,7 +44,7 @@ fn each_column_is_met_and_rows_are_let_be() {
     assert_eq!((columns.coefficients.len(), rows.coefficients.len()), (SIZE[0], SIZE[1]));
     let limit = 5.0 * NOISE_PX / f64::sqrt((20 * SIZE[1]) as f64);
     for (u, c) in columns.coefficients.iter().enumerate() {
-        // At the rims boxes are short: a twentieth.
+        // At the borders boxes are short: a twentieth.
         assert!((c - error_px(u)).abs() < limit + 0.06 * 0.05, "{u}: {c}");
     }
     assert!(rows.coefficients.iter().all(|c| c.abs() < limit));
@@ -57,8 +57,8 @@ fn each_column_is_met_and_rows_are_let_be() {
     assert!(LearntLines::of(&[], Axis::Row).is_none());
 }
 
-/// Every second line of 640 through both boxes and back, without noise: right to 2e-3 inside, and to a twentieth at the
-/// rims, whose boxes are short.
+/// Alternating values on 640 lines through both boxes and back, without noise: right to 2e-3 inside, and to a
+/// twentieth at the borders, where boxes are short.
 #[test]
 fn what_the_boxes_took_is_put_back() {
     const LINES: usize = 640;

@@ -3,7 +3,7 @@
 use crate::diagnose::views::known::KnownTerms;
 use crate::stats::{MAD_TO_SIGMA, bisect, normal_beyond};
 
-/// Noise of which a share is drawn so many times wider.
+/// Noise of which a `fraction` is drawn from a Gaussian `scale` times as wide.
 #[derive(Debug, Clone, Copy)]
 pub struct Mixture {
     fraction: f64,
@@ -19,26 +19,26 @@ impl Mixture {
         (mixture.fraction > 0.0 && mixture.scale > 1.0).then_some(mixture)
     }
 
-    /// Share of the readings beyond `t` of the narrow part's standard deviations.
+    /// Share of the readings beyond `t` standard deviations of the narrow component.
     fn beyond(&self, t: f64) -> f64 {
         (1.0 - self.fraction) * normal_beyond(t) + self.fraction * normal_beyond(t / self.scale)
     }
 
-    /// Standard deviation by the median, over that of the narrow part.
+    /// Standard deviation by the median, over that of the narrow component.
     pub fn width(&self) -> f64 {
         let [_, median] = bisect([0.0, self.scale], |t| self.beyond(t) > 0.5);
         MAD_TO_SIGMA * median
     }
 
-    /// Share beyond four standard deviations where there is this share of the strays, and their scale
-    /// is off by so many of its standard errors: that of weak tails is hardly known.
+    /// Share beyond four standard deviations with this share of the outliers, their scale off by so many of
+    /// its standard errors: that of weak tails is hardly known.
     pub fn tail(&self, share: f64, errors: f64) -> f64 {
         let scale = (self.scale + errors * self.scale_error).max(1.0);
         let other = Mixture { fraction: share * self.fraction, scale, ..*self };
         other.beyond(4.0 * other.width())
     }
 
-    /// Of the strays, over the noise's standard deviation.
+    /// Root mean square of the outliers over all readings, in standard deviations of the noise.
     pub fn size_sigma(&self) -> f64 {
         self.fraction.sqrt() * self.scale
     }

@@ -1,4 +1,4 @@
-//! What the structure of the noise amounts to: each view is one sample of every statistic.
+//! Findings from the structure of the noise; each view is one sample of every statistic.
 
 pub mod frame_means;
 pub mod frame_series;
@@ -37,7 +37,7 @@ use texture_finding::{Shared, TextureFinding};
 use view_mean::{ViewMean, nats, variance_px2};
 use window::{Window, part};
 
-/// All mismatches of structure at this error rate each.
+/// All mismatches of structure, each tested at this level.
 pub fn texture_findings(
     views: &[Structure],
     known: &KnownTerms,
@@ -58,7 +58,7 @@ pub fn texture_findings(
     found
 }
 
-/// A pattern whose grain is a few pixels wide is seen in pixels and in their means.
+/// Reports a pattern only once: with a grain of a few pixels it shows in pixels and in their means.
 fn tell_pattern_once(found: &mut Vec<TextureFinding>) {
     let of_pixels = found.iter().any(|f| f.families == [FIXED_PATTERN]);
     let of_means = |f: &TextureFinding| f.families.is_empty() && f.axis == Axis::Pixel;
@@ -70,8 +70,8 @@ fn tell_pattern_once(found: &mut Vec<TextureFinding>) {
     }
 }
 
-/// Further mismatches of a recording by itself, beside those that were `found`: beside a simulation, views and frames
-/// differ for no reason that could be told.
+/// Further mismatches of a recording by itself, besides those in `found`. Not for a comparison with a
+/// simulation: there, views and frames differ for no reason that could be stated.
 pub fn further_textures(
     views: &[Structure],
     known: &KnownTerms,
@@ -86,7 +86,7 @@ pub fn further_textures(
     all
 }
 
-/// Textures that some of the views have, beside those that were `found` of all.
+/// Textures that only some of the views have, besides those `found` in all.
 fn textures_of_some(
     views: &[Structure],
     known: &KnownTerms,
@@ -96,16 +96,18 @@ fn textures_of_some(
     type OfView<'a> = &'a dyn Fn(&Structure) -> Option<f64>;
     type Error<'a> = &'a dyn Fn(&Structure) -> f64;
     type OfAll = fn(&[Structure], &KnownTerms, f64) -> Vec<TextureFinding>;
-    // About what a model has of it views need not scatter to both sides alike.
+    // Skips what was found or is in the model: about a model's value the views need
+    // not scatter symmetrically.
     let told = |ids: &[&str]| {
         let found = found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
         found || ids.iter().any(|id| known.has(id))
     };
     let beside = if told(&[FIXED_PATTERN]) { pattern_px2(views) } else { 0.0 };
-    // Shares of a view's own variance, so that near and far views scatter alike.
+    // Relative to the view's own variance, so that near and far views scatter alike.
     let all: [(&[&str], OfView, Error, OfAll); 3] = [
         (&[ROW_NOISE], &|s| Some(s.row_px2? / s.variance_px2), &|s| s.line_error(0), lines),
-        // Rounding stands still: where it hides what neighbours share, frames are alike too.
+        // Quantisation errors are constant: where the steps are too coarse for a neighbour
+        // correlation, frames are alike too.
         (
             &["frozen-noise", "temporal-correlation"],
             &|s| s.neighbour_correlation.and(s.beside_pattern(beside)[0]),
@@ -120,7 +122,7 @@ fn textures_of_some(
         ),
     ];
     let of = |(ids, of_view, error, of_all): (&[&str], OfView, Error, OfAll)| {
-        // The second test of each at this level.
+        // Second test of each texture at this level.
         let some = some_views(views, of_view, Some(error)).filter(|some| 2.0 * some.p < level)?;
         let shown = of_all(&some.views, known, AMONG_SOME).into_iter();
         let mut named = shown.filter(|f| f.families.iter().any(|id| ids.contains(id)));
@@ -129,10 +131,10 @@ fn textures_of_some(
     all.into_iter().filter(|test| !told(test.0)).filter_map(of).collect()
 }
 
-/// Which of its names a texture has, where that some views have it is beyond doubt.
+/// Level for naming a texture once it is certain that some views have it.
 const AMONG_SOME: f64 = 0.05;
 
-/// Windows that differ by less than this factor are the same.
+/// Factor below which two window sides are the same.
 const SAME_WINDOW: f64 = 1.12;
 
 pub(in crate::diagnose) fn window(
@@ -165,14 +167,14 @@ pub(in crate::diagnose) fn window(
         let parameters = part.map_or_else(whole, of_part);
         return Some(found([0.0, length], parameters, size, p, nats));
     }
-    // A part of the noise alone: seen where neighbours are taken for independent.
+    // A window for only part of the noise shows in a test against independent neighbours.
     let near = ViewMean::of(views, |s| s.neighbour_correlation)?;
     let p = near.p_above(0.0);
     if expected > 1.0 || p >= level {
         return None;
     }
     let (size, nats) = (near.value.sqrt(), nats(&near, 0.0));
-    // Where side and share cannot be told apart: the window through which all would come.
+    // Where side and share cannot be separated: the window that all noise would pass through.
     let all = || {
         let side = window_of(near.value);
         let std_error = window_of(near.value + near.std_error) - side + 0.2 * (side - 1.0);
@@ -182,18 +184,17 @@ pub(in crate::diagnose) fn window(
     Some(found([0.0, reach], part.map_or_else(all, of_part), size, p, nats))
 }
 
-/// Where less of the noise than this comes through a window, it is told how much.
+/// The share of the noise that passes through the window is reported where it is below this.
 const WHOLE: f64 = 0.9;
 
-/// Side of the window that the model has, px, where a part of the noise alone comes through it with
-/// so much less correlation.
+/// Side of the model's window, px; reduced in proportion where only part of the noise passes through it.
 pub fn expected_window(known: &KnownTerms) -> f64 {
     let of = |name| known.parameter("spatial-correlation", name);
     let side = of("length_px").unwrap_or(1.0).max(1.0);
     1.0 + of("share").unwrap_or(1.0).clamp(0.0, 1.0) * (side - 1.0)
 }
 
-/// Rows of a frame that err as one each.
+/// Effect id: an error common to the pixels of each row of a frame.
 pub const ROW_NOISE: &str = "row-noise";
 
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
@@ -214,7 +215,7 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
         let by_pattern = ViewMean::of(views, |s| Some(s.still.by_pattern_px2[by_pattern]));
         let by_pattern = by_pattern.map_or(0.0, |m| m.value);
-        // Columns, rows and blotches have one error rate.
+        // Columns, rows and blotches share one level.
         (ViewMean::of_pairs(views, of).map(|m| m.and_error(by_pattern)), line, 3.0)
     };
     let all = [

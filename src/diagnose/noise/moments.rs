@@ -1,31 +1,31 @@
-//! The noise's third moment, and its fourth beyond a Gaussian's with what an uneven size of the noise adds taken
-//! off.
+//! Third moment of the noise, and its excess kurtosis corrected for a noise level that
+//! varies over the picture.
 //!
-//! Noise of a size s(u, v) that differs from place to place has a fourth moment of 3 (1 + c), where c is
-//! the variance of s^2 over its mean's square: as though its tails were heavy. Two pixels so near that
-//! they share s, and correlated by rho, have E x^2 y^2 = (1 + c) (1 + 2 rho^2) if they are Gaussian. So
+//! Noise of a standard deviation s(u, v) that varies over the picture has a fourth moment of 3 (1 + c), as if
+//! it had heavy tails; c is the variance of s^2 over its squared mean. Two Gaussian pixels close enough to
+//! share s, with correlation rho, have E x^2 y^2 = (1 + c) (1 + 2 rho^2). So
 //!
 //! ```text
 //! excess = E x^4 - 3 E x^2 y^2 / (1 + 2 rho^2)        x, y of unit variance
 //! ```
 //!
-//! is none for Gaussian noise whose size changes little from x to y. A third moment uneven sizes do not make.
+//! is zero for Gaussian noise whose s changes little from x to y. An uneven noise level adds no third moment.
 
 use super::tail_counts::{MIN_READINGS, patches};
 
-/// Residuals farther out, in standard deviations, are [`super::tails`]' to count: one gross error of 30
-/// would outweigh a million others here.
+/// Residuals beyond this many standard deviations are left to [`super::tails`]: one gross error of 30 would
+/// outweigh a million others here.
 const CUT: f32 = 4.5;
-/// E x^4 of a Gaussian that is cut there, its variance being 1 afterwards.
+/// E x^4 of a Gaussian truncated at [`CUT`] and rescaled to unit variance.
 const GAUSSIAN_FOURTH: f64 = 2.997_52;
-/// Pixels so far apart, px, share the size of the noise and little of its errors; what they share is
-/// taken off.
+/// Distance between the pixels of a pair, px: they share the noise level but little of the noise. Their
+/// correlation is corrected for.
 const APART_PX: usize = 8;
-/// Pairs may share so much, all directions together. Of 7 clean recordings with windows of 14 px (.29) three had an
-/// excess of .04, of 23 with narrower ones (12 px: .20) none. Wide windows alone do not make it: noise of even size,
-/// simulated, has at most .01 of them.
+/// Largest correlation of the pairs, averaged over all directions. Of 7 clean recordings with windows of
+/// 14 px (.29) three had an excess of .04, of 23 with narrower ones (12 px: .20) none. Wide windows alone are
+/// not the cause: simulated noise of even level has at most .01 with them.
 const MAX_SHARED: f64 = 0.25;
-/// Along rows, columns and both: noise is correlated by another rho in each.
+/// Along rows, along columns and along the diagonal, each with its own rho.
 const DIRECTIONS: [[usize; 2]; 3] = [[APART_PX, 0], [0, APART_PX], [APART_PX, APART_PX]];
 
 /// Sums over pairs of residuals of unit variance.
@@ -37,17 +37,17 @@ struct PairSums {
     products_of_squares: f64,
 }
 
-/// What the residuals of some images say, direction by direction.
+/// Sums over the residuals of some images, by direction.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moments {
     pairs: [PairSums; DIRECTIONS.len()],
     readings: f64,
-    /// Sum of the third powers, each about its patch's mean and over its patch's spread.
+    /// Sum of the cubed residuals, each about the mean and over the standard deviation of its patch.
     thirds: f64,
 }
 
 impl Moments {
-    /// Of an image's residuals: row by row, `width` px a row, in any unit, NaN where there is none.
+    /// Sums over the residuals of an image: row-major, `width` px wide, in any unit, NaN where there is none.
     pub fn of(image: &[f32], width: usize) -> Self {
         let mut unit = vec![f64::NAN; image.len()];
         let mut sums = Moments::default();
@@ -60,13 +60,13 @@ impl Moments {
                 near().for_each(|i| unit[*i] = scale * f64::from(image[*i]));
                 let mean = near().map(|i| unit[*i]).sum::<f64>() / n;
                 let spread = (1.0 - mean * mean).sqrt();
-                // Of one value alone there is no skewness.
+                // A single value has no skewness.
                 if spread > 0.0 {
                     let third = |i: &usize| ((unit[*i] - mean) / spread).powi(3);
                     sums.readings += n;
                     sums.thirds += near().map(third).sum::<f64>();
                 }
-                // Both of a pair have the scale of this patch.
+                // Both residuals of a pair are in units of this patch's standard deviation.
                 sums.add_pairs(&unit, width, &patch.pixels);
                 near().for_each(|i| unit[*i] = f64::NAN);
             }
@@ -101,12 +101,12 @@ impl Moments {
         }
     }
 
-    /// Skewness, where enough was looked at.
+    /// Skewness; `None` with too few readings.
     pub fn skewness(&self) -> Option<f64> {
         (self.readings >= MIN_READINGS).then(|| self.thirds / self.readings)
     }
 
-    /// Excess kurtosis, where enough was looked at and neighbours share little.
+    /// Excess kurtosis; `None` with too few pairs or where they are too correlated.
     pub fn excess(&self) -> Option<f64> {
         let rho = |s: &PairSums| s.products / s.pairs;
         let shared = self.pairs.iter().map(rho).sum::<f64>() / self.pairs.len() as f64;
@@ -156,7 +156,7 @@ mod tests {
         (0..SIZE[0] * SIZE[1]).map(|_| StandardNormal.sample(rng)).collect()
     }
 
-    /// Within four standard errors, and what a size that changes from pixel to pixel of a pair leaves.
+    /// Within four standard errors, plus what a noise level that differs within a pair leaves.
     #[test]
     fn gaussian_noise_has_none_even_uneven_or_correlated() {
         let even = excess(white);
@@ -166,8 +166,8 @@ mod tests {
             white(rng).iter().enumerate().map(|(i, x)| size(i) * x).collect()
         });
         assert!(uneven[0].abs() < 4.0 * uneven[1] + 0.02, "uneven: {uneven:?}");
-        // Means over 12 px of a row: rho is a third along rows and none along columns. Without 2 rho^2
-        // it would be -.22.
+        // Means over 12 px of a row: rho is 1/3 along rows and zero along columns. Without 2 rho^2
+        // the excess would be -.22.
         let rows = excess(|rng| {
             let white = white(rng);
             let mean = |i: usize| white[i..(i + 12).min(white.len())].iter().sum::<f32>();
@@ -176,8 +176,8 @@ mod tests {
         assert!(rows[0].abs() < 4.0 * rows[1] && rows[1] < 0.04, "rows: {rows:?}");
     }
 
-    /// Noise of 3 % that is Gaussian in the depth has an excess of 72 s^2 = .065 in the disparity, and
-    /// none in the depth.
+    /// Noise of 3 % that is Gaussian in the depth has an excess of 72 s^2 = .065 in the
+    /// disparity and none in the depth.
     #[test]
     fn what_is_gaussian_in_the_depth_looks_heavy_in_the_disparity() {
         const S: f64 = 0.03;
@@ -191,7 +191,7 @@ mod tests {
         assert!(depth[0].abs() < 4.0 * depth[1], "{depth:?}");
     }
 
-    /// Student's t of 24 degrees of freedom has 6 / 20 more, less what the cut takes.
+    /// Student's t with 24 degrees of freedom has an excess of 6 / 20, less what the cut removes.
     #[test]
     fn weak_tails_have_some() {
         let student = StudentT::new(24.0).expect("a distribution");
@@ -202,7 +202,8 @@ mod tests {
         assert!((0.15..0.3).contains(&found[0]), "{found:?}");
     }
 
-    /// Means over 16 x 16 px: pairs 8 px apart share half along either axis, and a quarter along both.
+    /// Means over 16 x 16 px: pairs 8 px apart have a correlation of 1/2 along either
+    /// axis and 1/4 along both.
     #[test]
     fn a_window_wider_than_the_pairs_are_apart_tells_nothing() {
         const SIDE: usize = 16;
@@ -213,7 +214,7 @@ mod tests {
         assert!(Moments::of(&white(&mut rng), SIZE[0]).excess().is_some());
     }
 
-    /// Too small a picture, words so coarse that most residuals are none, no noise at all.
+    /// Too small a picture, steps so coarse that most residuals are zero, no noise at all.
     #[test]
     fn what_shows_no_noise_tells_nothing() {
         assert_eq!(Moments::of(&vec![1.0; 2000], 50).excess(), None);

@@ -1,16 +1,15 @@
-//! What the noise's far errors are drawn from: how many there are and how wide they lie, from counts
-//! between a few distances.
+//! Fraction and scale of the far errors, from counts between a few distances.
 //!
-//! Near the middle they hide in the noise, so that the part of them which is not seen depends on the
-//! form of their distribution. A matcher that locks to a wrong place errs by a Gaussian; where near
-//! places win more often than far ones, by a Laplace distribution; where all in its window are alike,
-//! by a uniform one. The posterior is summed over the three.
+//! Near the middle far errors are hidden in the noise, so their unseen part depends on the form of their
+//! distribution. A matcher that locks to a wrong place errs by a Gaussian; where near places win more often
+//! than far ones, by a Laplace distribution; where all in its window are alike, by a uniform one. The
+//! posterior is summed over the three.
 
 use super::tail_counts::{TAIL_EDGES, TailCounts};
 use crate::diagnose::search::posterior::Posterior;
 use crate::stats::normal_beyond;
 
-/// Share and scale of the far errors, each with its standard error; the scale is their standard
+/// Fraction and scale of the far errors, each with its standard error. The scale is their standard
 /// deviation over that of the noise.
 #[derive(Debug, Clone, Copy)]
 pub struct Outliers {
@@ -18,22 +17,22 @@ pub struct Outliers {
     pub scale: [f64; 2],
 }
 
-/// Share of unit errors farther out than `t` standard deviations.
+/// Share of errors of unit variance beyond `t` standard deviations.
 const FORMS: [fn(f64) -> f64; 3] = [
     normal_beyond,
     |t| (-std::f64::consts::SQRT_2 * t).exp(),
     |t| (1.0 - t / 3f64.sqrt()).max(0.0),
 ];
 
-/// Scales that are tried; evenly in the logarithm.
+/// Scales tried, evenly spaced in the logarithm.
 const SCALES: usize = 240;
 const REACH: [f64; 2] = [1.2, 30.0];
-/// The sigma that distances are measured in: a patch of 40 px a side has its own to 2 %, and is
-/// uneven by about as much again. So much are both parameters off, and a bin's expected count.
+/// Relative error of the sigma in which distances are measured: a patch of 40 px a side has its own to 2 %,
+/// and is uneven by about as much again. Both parameters, and the expected count of a bin, have it too.
 const SIGMA: f64 = 0.05;
 
-/// The far errors that make these counts, whose total differs from view to view so that its mean is
-/// known to the share `scatter`; `None` where hardly any are counted.
+/// Fits the far errors to these counts. `scatter` is the relative standard error of their mean total, which
+/// varies between views. `None` where there are no more than the noise's own.
 pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
     let own = |t: f64| counts.n * FORMS[0](t);
     let chance: Vec<f64> = TAIL_EDGES.windows(2).map(|w| own(w[0]) - own(w[1])).collect();
@@ -54,7 +53,7 @@ pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
                 continue;
             }
             let fraction = more / inside / counts.n;
-            // More than all cannot stray.
+            // No more than all readings can be outliers.
             if fraction >= 1.0 {
                 continue;
             }
@@ -62,7 +61,7 @@ pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
             let misfit = bins.map(|(w, (seen, chance))| {
                 let expected = chance + more * (beyond(w[0]) - beyond(w[1])) / inside;
                 let variance = expected + (SIGMA * expected).powi(2);
-                // Likelihood of a Gaussian count, its own variance part of it.
+                // Gaussian likelihood of a count, including its variance's own term.
                 0.5 * ((seen - expected).powi(2) / variance + variance.max(1.0).ln())
             });
             nodes.push([misfit.sum(), fraction, scale]);

@@ -1,4 +1,4 @@
-//! Far errors of known share and scale, drawn among Gaussian noise.
+//! Far errors of known fraction and scale among Gaussian noise.
 
 use rand::Rng;
 use rand_distr::{Distribution, Exp1, StandardNormal};
@@ -6,7 +6,7 @@ use rand_distr::{Distribution, Exp1, StandardNormal};
 use super::*;
 use crate::rng::{Seed, Stream};
 
-/// Of the views' readings.
+/// Number of readings.
 const READINGS: usize = 400_000;
 
 fn counted(rng: &mut Stream, fraction: f64, stray: impl Fn(&mut Stream) -> f64) -> TailCounts {
@@ -19,7 +19,7 @@ fn counted(rng: &mut Stream, fraction: f64, stray: impl Fn(&mut Stream) -> f64) 
     counts
 }
 
-/// How many of the intervals of 90 % hold the truth, of fraction and scale.
+/// Number of 90 % intervals that hold the true fraction and scale.
 fn held(name: &str, seeds: u64, stray: fn(&mut Stream, f64) -> f64) -> [usize; 2] {
     let mut held = [0; 2];
     for seed in 0..seeds {

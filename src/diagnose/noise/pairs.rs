@@ -1,9 +1,9 @@
-//! What pixels of one image have in common with their neighbours and with their row and column:
-//! mean products over all the pairs there are.
+//! What pixels of an image share with their neighbours and with their row and column: mean
+//! products over all pairs.
 //!
-//! With S the sum over a row, S^2 less what is on the diagonal is the score of a variance that the
-//! row shares; the products with a box around each pixel are that of one it shares with its
-//! neighbours. Each costs a few passes over the image.
+//! With S the sum over a row, S^2 less the diagonal is the score of a variance that the row shares;
+//! the products with a box around each pixel are that of one shared with neighbours. Each costs a
+//! few passes over the image.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,29 +12,29 @@ use crate::diagnose::views::box_sums::over_boxes;
 use crate::solve::plane_equations;
 use crate::stats::mean;
 
-/// As far as neighbours are looked at, px.
+/// Reach of the neighbourhood, px.
 pub const REACH_PX: usize = 4;
 /// Pixels closer than this along a line may share a window, px.
 const APART_PX: usize = 16;
-/// Fewer pairs say nothing.
+/// Fewest pairs for an estimate.
 const MIN_PAIRS: f64 = 1000.0;
 
 /// Mean products, px^2.
 #[derive(Debug, Clone, Copy)]
 pub struct Pairs {
-    /// Of pixels with themselves.
+    /// Of each pixel with itself.
     pub power: f64,
-    /// Of pixels of one row that lie apart, and of one column.
+    /// Of distant pixels in one row, and in one column.
     pub row: Option<f64>,
     pub column: Option<f64>,
-    /// How many pairs these are of, in rows and in columns, each pair met twice.
+    /// Number of these pairs in rows and in columns, each counted twice.
     pub line_pairs: [f64; 2],
     /// Of neighbours, without what rows and columns share.
     pub near: f64,
 }
 
 impl Pairs {
-    /// Of an image of the noise, whatever plane it holds taken out; NaN where there is nothing.
+    /// Measures an image of the noise, less any plane in it; NaN where there is no value.
     pub fn of(image: &[f32], width: usize) -> Option<Self> {
         let (level, plane) = Plane::taken_from(image, width)?;
         let level = without_outliers(&level);
@@ -45,9 +45,9 @@ impl Pairs {
         if beside.pairs < MIN_PAIRS {
             return None;
         }
-        // The plane took a little of every product with it: the noise of as many pixels as hang together
-        // within the reach, times the leverage of the two pixels on one another. Of neighbours that is three
-        // over the number of pixels on average, as of a pixel on itself.
+        // The plane took part of every product with it: the noise of the pixels correlated within the reach,
+        // times the leverage of the two pixels on each other. That averages three over the number of pixels
+        // for neighbours, as for a pixel on itself.
         let taken = power + beside.products / pixels;
         let lines = |count: usize, length: usize, at: &dyn Fn(usize, usize) -> usize| {
             let (mut sum, mut leverage) = (Sum::default(), 0.0);
@@ -67,17 +67,17 @@ impl Pairs {
     }
 }
 
-/// Neighbours of a pixel, and the share of them in its own row.
+/// Number of neighbours of a pixel, and the share of them in its own row.
 pub const NEIGHBOURS: usize = (2 * REACH_PX + 1) * (2 * REACH_PX + 1) - 1;
 const ON_THE_LINE: f64 = (2 * REACH_PX) as f64 / NEIGHBOURS as f64;
 
-/// Side of the square window in which as many pixels make one as where neighbours are correlated by
-/// `rho` on average.
+/// Side of the square window with as many pixels per independent sample as a mean
+/// neighbour correlation of `rho`.
 pub fn window_of(rho: f64) -> f64 {
     (1.0 + NEIGHBOURS as f64 * rho).max(1.0).sqrt()
 }
 
-/// Products of pairs, each pair met twice, and their number.
+/// Sum of the products of pairs, each counted twice, and their number.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
     products: f64,
@@ -90,7 +90,7 @@ impl Sum {
     }
 }
 
-/// Pairs of a line's pixels in blocks that do not touch.
+/// Sums over pairs of a line's pixels in blocks that do not touch.
 fn along(line: impl Iterator<Item = f64>) -> Sum {
     let (mut whole, mut before, mut block) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     let mut close = [0.0; 2];
@@ -114,7 +114,7 @@ fn along(line: impl Iterator<Item = f64>) -> Sum {
     Sum { products: whole[0].powi(2) - close[0], pairs: whole[1].powi(2) - close[1] }
 }
 
-/// Pairs within the reach of one another, by sums over boxes.
+/// Sums over pairs within the reach of each other, by box sums.
 fn neighbours(image: &[f32], width: usize) -> Sum {
     let mut sum = Sum::default();
     over_boxes(image, width, REACH_PX, |i, products, pairs| {
@@ -134,7 +134,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// The image less its plane; `None` with too few pixels for one.
+    /// Subtracts the plane from the image; `None` with too few pixels for one.
     fn taken_from(image: &[f32], width: usize) -> Option<(Vec<f32>, Plane)> {
         let centre = [width, image.len() / width].map(|side| 0.5 * side as f64);
         let mut plane = Plane { width, centre, whitening: Matrix3::zeros() };
@@ -157,7 +157,7 @@ impl Plane {
         Vector3::new(1.0, x, y)
     }
 
-    /// Leverage of two pixels of a line on one another, summed over the pairs of [`along`].
+    /// Leverage of two pixels of a line on each other, summed over the pairs of [`along`].
     fn leverage_along(&self, image: &[f32], line: impl Iterator<Item = usize> + Clone) -> f64 {
         let of = |k: usize| {
             let whitened = |i: usize| (self.whitening * self.columns(i))[k];
@@ -181,7 +181,7 @@ mod tests {
     const HEIGHT: usize = 90;
     const BOX: usize = 5;
 
-    /// Unit noise on a plane, with holes, plus `more` of (u, v); a hundred images' statistics.
+    /// Statistics of a hundred images: unit noise on a plane, with holes, plus `more` of (u, v).
     fn pairs(name: &str, rows: f64, more: impl Fn(usize, usize) -> f64) -> Vec<Pairs> {
         let one = |n: u64| {
             let mut rng = Seed(n).stream(name);
@@ -217,7 +217,7 @@ mod tests {
         near(&all, |p| p.near, 0.0);
     }
 
-    /// So many images of noise through boxes of 5 px.
+    /// Statistics of images of noise through boxes of 5 px.
     fn through_boxes(sides: [usize; 2], images: u64) -> Vec<Pairs> {
         let one = |n: u64| {
             let mut rng = Seed(n).stream("pairs/window");
@@ -228,7 +228,7 @@ mod tests {
         (0..images).map(one).collect()
     }
 
-    /// In a picture of three blocks of a line: pairs of its first and its last lie at opposite
+    /// In a picture of three blocks a line, pairs of the first and the last lie at opposite
     /// ends of the plane's slope.
     #[test]
     fn noise_through_a_window_shares_nothing_along_a_line() {
@@ -237,7 +237,8 @@ mod tests {
         near(&all, |p| p.column.unwrap(), 0.0);
     }
 
-    /// Eight hundred tell it to 2.5 %. The plane takes two of 47 rows that have nothing in common, and its slopes a little.
+    /// Eight hundred images give it to 2.5 %. The plane takes two of 47 independent rows,
+    /// and its slopes a little.
     #[test]
     fn what_lines_share_errs_as_is_said() {
         let all = through_boxes([160, 160], 800);

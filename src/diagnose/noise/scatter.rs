@@ -1,4 +1,4 @@
-//! What scatters about the mean: how the noise hangs together, how large it is, and its tails.
+//! Scatter about the mean: structure, size and tails of the noise.
 
 use super::lines::LearntLines;
 use super::skewness::skewness;
@@ -17,13 +17,13 @@ use crate::diagnose::steps::{Steps, forget_windows, own_step};
 use crate::diagnose::views::known::ray_share;
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
 
-/// What scatters about the mean.
+/// Results on the scatter about the mean.
 pub struct ScatterResult {
-    /// One number of each kind a view.
+    /// Statistics of each view.
     pub structure: Vec<Structure>,
     pub textures: Vec<TextureFinding>,
     pub tails: Option<TextureFinding>,
-    /// Of the variance.
+    /// Search of the variance.
     pub outcome: Outcome,
 }
 
@@ -71,7 +71,7 @@ impl Case<'_> {
         measure_tails(&mut structure, &self.fields, &mean.px, &whitener);
         let alike = self.baseline.as_ref().is_some_and(|b| b.tails_alike(&structure));
         let holds = |t: &Term| self.holds_tails(t);
-        // The light of single pixels is known to little better than an octave.
+        // The light of single pixels is hardly known better than to an octave.
         let by_light = |t: &Term| t.basis.axis() == Axis::Intensity;
         let uneven = outcome.chosen.iter().any(|c| c.candidate.family.is_none())
             || terms.iter().chain(&self.known.variance).any(by_light)
@@ -82,7 +82,7 @@ impl Case<'_> {
         let confusers = Confusers { uneven, simulated: self.baseline.is_some(), stepped };
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
-        // Far errors to one side alone make both; what is skewed has a fourth moment.
+        // Far errors on one side alone cause tails and skewness; skewed noise has an excess fourth moment.
         let far = tails.as_ref().is_some_and(TextureFinding::are_far_errors);
         let may_be = self.baseline.is_none() && !far;
         let skewed = may_be.then(|| skewness(&structure, each)).flatten();
@@ -92,7 +92,7 @@ impl Case<'_> {
         ScatterResult { structure, textures, tails, outcome }
     }
 
-    /// Lines that stand still are part of the mean: beside them the noise has its own size and tails.
+    /// Adds constant lines to the mean: without them the noise has its own size and tails.
     fn learn_lines(&mut self, mean: &mut MeanResult, textures: &[TextureFinding]) {
         let still = textures.iter().filter(|t| t.are_still_lines());
         let axes: Vec<Axis> = still.map(|t| t.axis).collect();
@@ -100,15 +100,15 @@ impl Case<'_> {
             return;
         }
         self.take_out_lines(mean, &axes);
-        // Whole lines were taken for noise that hangs together: views count for more beside them.
+        // Whole lines had passed for correlated noise: without them the views weigh more.
         if self.survey.reweigh(&self.fields, &mean.px) {
             *mean = self.mean();
             self.take_out_lines(mean, &axes);
         }
     }
 
-    /// Where rows have an error of their own, as was found or is known, they tell less of the mean and of the noise's
-    /// size than their pixels do.
+    /// Lowers the weights of the views where row noise was found or is known: rows say less of the mean and
+    /// of the size of the noise than their pixels do.
     fn weigh_rows(
         &mut self,
         mean: &mut MeanResult,
@@ -138,7 +138,7 @@ impl Case<'_> {
         mean.px = pixel_terms(&self.fields, &mean.all_terms(), &self.survey, &self.bench);
     }
 
-    /// How the noise hangs together; against a simulation, what goes beyond the simulation's.
+    /// Structure of the noise; against a simulation, what exceeds the simulation's.
     fn textures(&mut self, structure: &mut [Structure], each: f64) -> Vec<TextureFinding> {
         let (mut of_parts, mut shrunk) = (Vec::new(), false);
         if let Some(baseline) = &mut self.baseline {
@@ -150,7 +150,7 @@ impl Case<'_> {
             of_parts = baseline.noise_findings(parts.as_ref(), structure, &self.fields, each);
             baseline.compare(structure, &self.lattice, &mut self.known);
             if let Some(found) = found {
-                // The extended model has it, under its name or in its size.
+                // The extended model already has it, by name or in the size of the noise.
                 let held = |h: &TextureFinding| {
                     let nameless = h.families.is_empty() && !found.variance.is_empty();
                     nameless || h.families.iter().any(|id| found.has(id))
@@ -165,7 +165,7 @@ impl Case<'_> {
             .is_none()
             .then(|| further_textures(structure, &self.known, each, &textures));
         textures.retain(|h| self.stands(h.p, each));
-        // The other views and frames are what these are held against, and no model.
+        // These are tested against the other views and frames, not against a model.
         textures.extend(further.into_iter().flatten());
         if shrunk && !textures.iter().any(|h| h.families.contains(&"spatial-correlation")) {
             textures.extend(window(structure, &self.known, NAMED_LEVEL));
@@ -174,15 +174,15 @@ impl Case<'_> {
         textures
     }
 
-    /// How many times less sure the mean of each view is than its samples say, with a pattern that all views show.
+    /// Variance inflation of each view's mean by a pattern that all views share.
     pub fn excess_of_pattern(&self, structure: &[Structure]) -> Vec<f64> {
         let (px2, n) = (fixed_px2(structure), structure.len() as f64);
         let views = structure.iter().zip(&self.survey.views);
         views.map(|(s, v)| s.excess_of_pattern(px2, v.frames, n, &v.correlation)).collect()
     }
 
-    /// A refit that makes sigma much smaller somewhere rests on noise that steps have swallowed, or
-    /// on a cause that was taken for noise: against it everything has tails.
+    /// Whether tails can be measured against this term. A refit that makes sigma much smaller somewhere rests
+    /// on noise lost in quantisation, or on a cause taken for noise: against it everything has tails.
     fn holds_tails(&self, term: &Term) -> bool {
         const MUCH: f64 = -1.4;
         let mut places = self.survey.views.iter().flat_map(|v| v.places.iter());

@@ -1,4 +1,4 @@
-//! Errors that reach farther to one side than to the other.
+//! Detects errors that reach farther to one side than to the other.
 
 use super::some_views::some_views;
 use super::structure::Structure;
@@ -7,22 +7,22 @@ use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::one;
 use crate::terms::{Axis, Statistic};
 
-/// Less is no news: what bends the disparity a little, as a window that averages over depths does, makes as much as
-/// the step from disparity to depth, which is .05 for a Kinect at 4 m (6 times its relative sigma).
+/// Least skewness reported. A slight bend of the disparity, as by a window that averages over depths, makes
+/// as much as the step from disparity to depth: .05 for a Kinect at 4 m (6 times its relative sigma).
 const MIN_SKEWNESS: f64 = 0.05;
 
-/// Of all views or of some, in the disparity and in the depth alike: noise that is symmetric in one of them is skewed
-/// in the other.
+/// Tests all views or some, in both disparity and depth: noise that is symmetric in
+/// one is skewed in the other.
 pub fn skewness(views: &[Structure], level: f64) -> Option<TextureFinding> {
     [1.0, -1.0].into_iter().find_map(|sign| to_side(views, sign, level))
 }
 
-/// To large disparities, or to small ones.
+/// Tests for skewness towards large disparities (`sign` 1) or small ones (-1).
 fn to_side(views: &[Structure], sign: f64, level: f64) -> Option<TextureFinding> {
     let of =
         |s: &Structure| s.skewness()?.map(|skew| sign * skew).into_iter().min_by(f64::total_cmp);
     let m = ViewMean::of(views, of)?;
-    // Two sides, and of each all views and some.
+    // Two sides, and all views or some for each.
     let p = 4.0 * m.p_above(0.0);
     if m.value >= MIN_SKEWNESS && p <= level {
         return Some(found(&m, sign, p));
@@ -36,7 +36,7 @@ fn found(m: &ViewMean, sign: f64, p: f64) -> TextureFinding {
     let side = if sign > 0.0 { "large disparities" } else { "small disparities" };
     TextureFinding {
         parameters: one("skewness", sign * m.value, m.std_error),
-        // What a Gaussian of the same variance is off by, to first order of its series in Hermite polynomials.
+        // Deviation from a Gaussian of the same variance, to first order in Hermite polynomials.
         size_sigma: m.value / 6f64.sqrt(),
         p,
         nats: nats(m, 0.0),
@@ -60,7 +60,7 @@ mod tests {
         let skewed = drawn("gamma", 0.001, |_, rng| (gamma.sample(rng) - SHAPE) / SHAPE.sqrt());
         let found = skewness(&skewed, 1e-3).expect("skewed");
         let told = found.parameters["skewness"]["value"].as_f64().unwrap();
-        // Four standard errors of 420,000 readings, beside what the cut at 4.5 sigma takes.
+        // Four standard errors of 420,000 readings, plus what the cut at 4.5 sigma removes.
         assert!((told - 0.194).abs() < 0.02, "{told}");
         assert!(skewness(&drawn("gaussian", 0.001, |_, rng| normal(rng)), 1e-3).is_none());
     }

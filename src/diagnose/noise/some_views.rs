@@ -1,4 +1,4 @@
-//! Statistics that some of the views have and the others have not: of those a mean over all tells little.
+//! Detects statistics that only some of the views show; a mean over all views would hide them.
 
 use statrs::distribution::{Chi, Continuous};
 
@@ -6,29 +6,29 @@ use super::structure::Structure;
 use super::view_mean::Weight;
 use crate::stats::{at_least, normal_beyond, student_upper};
 
-/// Fewer views than this, and than this share of all, are odd ones.
+/// Fewer views than this, or than this share of all, are outliers.
 const MIN_VIEWS: usize = 3;
 const MIN_SHARE: f64 = 0.2;
-/// Fewer views below what is expected do not tell how far views scatter: with two, half of it is chance. Then the
-/// views' own error counts as much as so many.
+/// With fewer views below the expected value their scatter is unknown: with two, half of it is chance. The
+/// views' own error then counts as this many views.
 const MIN_BELOW: usize = 3;
-/// A view beyond the fewest is one of them where as far above is this improbable.
+/// Any further view is included where its p-value is below this.
 const CLEAR: f64 = 0.01;
 
-/// How many views are more than odd ones.
+/// Fewest views, out of this many, that are more than outliers.
 pub fn min_views(views: usize) -> usize {
     MIN_VIEWS.max((MIN_SHARE * views as f64).ceil() as usize)
 }
 
-/// Views that lie above the others, by their numbers, and the chance that so many lie so far.
+/// Indices of the views that lie above the others, and the p-value.
 pub struct SomeViews {
     pub which: Vec<usize>,
     pub p: f64,
 }
 
 impl SomeViews {
-    /// Of what each view is off by, in one unit. Where there is nothing, they scatter alike to both sides, so that
-    /// those below tell how far.
+    /// Tests the deviations of the views, all in one unit. Without an effect they scatter symmetrically, so
+    /// those below zero give the scale.
     pub fn above(off: &[f64]) -> Option<Self> {
         let below = || off.iter().filter(|t| **t < 0.0);
         let n = below().count();
@@ -36,8 +36,8 @@ impl SomeViews {
         (n >= MIN_BELOW && scale > 0.0).then(|| SomeViews::beyond(off, scale, n))?
     }
 
-    /// Of what each view is off by in units of its own error, where too few lie below to tell how far views scatter:
-    /// where most of them have it.
+    /// Tests deviations in units of each view's own error, for too few views below zero to give the scale:
+    /// where most views show the effect.
     pub fn above_error(off: &[f64]) -> Option<Self> {
         let below = off.iter().filter(|t| **t < 0.0);
         let (n, squares) = below.fold((0, 0.0), |(n, sum), t| (n + 1, sum + t * t));
@@ -46,7 +46,7 @@ impl SomeViews {
         (n < MIN_BELOW).then(|| SomeViews::beyond(off, scale, freedom))?
     }
 
-    /// Of what each view is off by, which is known to err by `scale`, as `freedom` values tell.
+    /// Tests deviations with a standard error of `scale`, known with `freedom` degrees of freedom.
     pub fn beyond(off: &[f64], scale: f64, freedom: usize) -> Option<Self> {
         let above = |v: &usize| off[*v] > 0.0;
         let mut which: Vec<usize> = (0..off.len()).filter(above).collect();
@@ -61,15 +61,15 @@ impl SomeViews {
     }
 }
 
-/// Views that lie above the others, among so many that were measured, and the chance of it.
+/// Views that lie above the others, the number of views measured, and the p-value.
 pub struct Above {
     pub views: Vec<Structure>,
     pub of: usize,
     pub p: f64,
 }
 
-/// Those of the views whose `value`, which is none on average where there is nothing, lies above the others'; `error` is
-/// what pixels that have nothing in common make it err by, where that is known.
+/// Finds the views whose `value` lies above the others'. Its mean is zero without an effect; `error` is then
+/// its standard error, where known.
 pub fn some_views(
     views: &[Structure],
     value: impl Fn(&Structure) -> Option<f64>,
@@ -90,12 +90,12 @@ pub fn some_views(
     Some(Above { views, of: which.len(), p })
 }
 
-/// Chance that the k-th of `above` half normal values lies this far out, in units of the root mean square of `below`
-/// others: summed over what that may be.
+/// P-value of the `k`-th largest of `above` half-normal values at `far`, in units of the root mean square of
+/// `below` other values; marginalised over that root mean square.
 fn order_statistic(far: f64, k: usize, above: usize, below: usize) -> f64 {
     const STEPS: usize = 400;
     let Ok(chi) = Chi::new(below as u64) else { return 1.0 };
-    // Nothing is left of the distribution beyond.
+    // The density beyond is negligible.
     let end = (below as f64).sqrt() + 6.0;
     let at = |step: usize| {
         let chi_value = end * (step as f64 + 0.5) / STEPS as f64;
@@ -117,20 +117,20 @@ mod tests {
         (0..n).map(|v| 0.01 * (normal() + if v < tall { by } else { 0.0 })).collect()
     }
 
-    /// Of sessions without anything one in a hundred is found at that level.
+    /// Of sessions without an effect, one in a hundred is found at that level.
     #[test]
     fn clean_views_are_found_as_often_as_the_level_says() {
         let mut rng = Seed(3).stream("some-views/null");
         for n in [10, 16, 30] {
             let chance = |_| SomeViews::above(&views(n, 0, 0.0, &mut rng)).map_or(1.0, |s| s.p);
             let seen = (0..4000).map(chance).filter(|p| *p < 0.01).count();
-            // Binomial: 40, give or take 6.3; too few to one side make it fewer.
+            // Binomial: 40 +- 6.3; too few views on one side make it fewer.
             assert!((8..60).contains(&seen), "{seen} of 4000 with {n}");
         }
     }
 
-    /// By their own error, known as well as three values tell it: in one session of five views in two fewer than three lie
-    /// below, and of those one in a hundred is found at that level, 100 of 20,000 give or take 10.
+    /// With their own error, known with three degrees of freedom: in one of two sessions of five views fewer
+    /// than three lie below zero, and one in a hundred of these is found at that level: 100 of 20,000 +- 10.
     #[test]
     fn clean_views_are_found_by_their_own_error_as_often_as_the_level_says() {
         let mut rng = Seed(6).stream("some-views/own-error");
@@ -144,7 +144,7 @@ mod tests {
         assert!((60..140).contains(&seen), "{seen} of 20000");
     }
 
-    /// Of twelve views nine have it, and of the others fewer than three lie below in most sessions.
+    /// Nine of twelve views show the effect; in most sessions fewer than three of the others lie below zero.
     #[test]
     fn nine_of_twelve_views_are_told_by_their_own_error() {
         let mut rng = Seed(5).stream("some-views/most");
@@ -153,7 +153,8 @@ mod tests {
         };
         let told = (0..200).filter_map(|_| SomeViews::above_error(&off(9)));
         let told = told.filter(|s| s.p < 1e-4 && s.which.len() == 9).count();
-        // Of the three others none, one or two lie below in 7 of 8 sessions, and one in ten has a tenth view beyond one chance in a hundred or a wide scale.
+        // In 7 of 8 sessions none, one or two of the three others lie below zero; in one in ten of these a
+        // tenth view has a p-value below 0.01, or the scale is wide.
         assert!((120..=175).contains(&told), "{told} of 200");
     }
 
@@ -165,11 +166,11 @@ mod tests {
             let Some(found) = SomeViews::above(&views(20, 5, 12.0, &mut rng)) else { continue };
             clear += usize::from(found.p < 1e-4 && found.which[..5] == [0, 1, 2, 3, 4]);
         }
-        // In 44 of 50, give or take 2.3: the rest has few views below, which tell little of how far views scatter.
+        // In 44 of 50 +- 2.3: the others have few views below zero, which say little of the views' scatter.
         assert!(clear >= 36, "{clear} of 50");
         let odd = views(20, 1, 100.0, &mut rng);
         assert!(SomeViews::above(&odd).is_none_or(|s| s.p > 1e-3));
-        // As many to the other side are no effect.
+        // As many views below the others are no effect.
         let low = views(20, 5, -12.0, &mut rng);
         assert!(SomeViews::above(&low).is_none_or(|s| s.p > 1e-3));
     }

@@ -1,4 +1,4 @@
-//! What pixels err by in every view alike: the views' covariance, pixel by pixel.
+//! Errors that pixels repeat in every view: covariance of the views, pixel by pixel.
 
 use rand::Rng;
 use rayon::prelude::*;
@@ -9,22 +9,22 @@ use crate::diagnose::views::field::Field;
 use crate::rng::Seed;
 use crate::terms::Axis;
 
-/// Covariances of a view's mean residual with the other views', px^2: of pixels, without what whole lines share;
-/// of means over a few pixels, the same; of whole columns and of whole rows, as far as they change from one to the
-/// next. Means and lines beyond those of a pattern of independent pixels.
+/// Covariances of a view's mean residual with the other views', px^2: of pixels and of means over a few
+/// pixels, both without what whole lines share; of whole columns and rows, as far as they change from one to
+/// the next. Means and lines in excess of those of a pattern of independent pixels.
 #[derive(Debug, Clone, Default)]
 pub struct Still {
     pub fixed_px2: Option<f64>,
-    /// Of as many pixels as all count alike.
+    /// Effective number of pixels, all of equal weight.
     pub fixed_pixels: f64,
     pub blotches_px2: Option<f64>,
     pub lines_px2: [Option<f64>; 2],
-    /// Standard errors of columns, rows and blotches in all views alike, px^2: the pattern's own are few.
+    /// Standard errors common to all views of columns, rows and blotches, px^2: the pattern has few of them.
     pub by_pattern_px2: [f64; 3],
 }
 
 impl Still {
-    /// With what a pattern of variance 1 keeps.
+    /// Scales by what remains of a pattern of variance 1.
     fn of(
         [pixels, blotches, lines @ ..]: [Option<Product>; 4],
         kept: &[Option<Product>; 4],
@@ -35,7 +35,7 @@ impl Still {
         let beyond = |seen: Option<Product>, kept| {
             seen.map(|seen| seen.px2 - of_pattern(kept).unwrap_or(0.0))
         };
-        // The coins' own lines are as few as the pattern's.
+        // The coins have as few lines as the pattern: twice the variance.
         let error = |kept: Option<Product>, repeats: f64| {
             let relative = kept.map_or(0.0, |k| k.error_px2 * (2.0 * repeats).sqrt());
             relative * fixed_px2.unwrap_or(0.0).abs()
@@ -54,11 +54,10 @@ impl Still {
     }
 }
 
-/// Sum over all lags of the squared correlation of [`sharp_lines`]: 1, -2/3 and 1/6.
+/// Sum of the squared correlation of [`sharp_lines`] over all lags: 1, -2/3 and 1/6.
 const SHARP_REPEATS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 
-/// What a pattern of variance 1 keeps in each view where it is measured: every pixel is part of the means that
-/// are taken out.
+/// What remains in each view of a pattern of variance 1: every pixel is part of the means subtracted.
 pub struct KeptPattern(Vec<[Option<Product>; 4]>);
 
 impl KeptPattern {
@@ -69,13 +68,13 @@ impl KeptPattern {
     }
 }
 
-/// Each view with what is known of it to be no noise, px, by pixel (or nothing).
+/// Each view with its known bias, px by pixel (or empty).
 pub fn beside_bias<'a>(fields: &'a [Field], bias: &'a [Vec<f32>]) -> Vec<(&'a Field, &'a [f32])> {
     let of = |n: usize| bias.get(n).map_or(&[][..], Vec::as_slice);
     fields.iter().enumerate().map(|(n, f)| (f, of(n))).collect()
 }
 
-/// Of the views that `kept` was made of, each with what is known of it to be no noise.
+/// Covariances of the views that `kept` was made from, each with its known bias.
 pub fn still(views: &[(&Field, &[f32])], kept: &KeptPattern) -> Vec<Still> {
     debug_assert_eq!(views.len(), kept.0.len());
     let seen = covariances(views, |f, b| at_two_scales(f, &f.mean, b));
@@ -86,13 +85,13 @@ pub fn still(views: &[(&Field, &[f32])], kept: &KeptPattern) -> Vec<Still> {
 #[derive(Debug, Clone, Copy)]
 struct Product {
     px2: f64,
-    /// Of as many values that all count alike.
+    /// Effective number of values, all of equal weight.
     n: f64,
-    /// Standard error, by the products' scatter.
+    /// Standard error from the scatter of the products.
     error_px2: f64,
 }
 
-/// Of pixels, means over a few, columns and rows.
+/// Covariances of pixels, of means over a few, of columns and of rows.
 fn covariances(
     views: &[(&Field, &[f32])],
     images: impl Fn(&Field, &[f32]) -> [Vec<f32>; 2] + Sync,
@@ -112,12 +111,11 @@ fn covariances(
     (0..views.len()).map(|v| [pixels[v], blotches[v], columns[v], rows[v]]).collect()
 }
 
-/// Of fewer pixels, and of fewer lines, that another view saw as well nothing is told.
+/// Fewest pairs of pixels, and of lines, with the other views.
 const MIN_PAIRS: [f64; 2] = [1000.0, 100.0];
 
-/// What the mean of each column, and of each row, has beyond the mean of its neighbours'; NaN where one of
-/// them is short. What is smooth, as leftovers of shapes are, is not in it; lines that err independently
-/// keep their variance.
+/// Mean of each column, and of each row, minus the mean of its two neighbours; NaN where one of the three is
+/// short. Smooth remainders of shapes drop out; lines with independent errors keep their variance.
 fn sharp_lines(image: &[f32], width: usize) -> [Vec<f32>; 2] {
     let mean = |(sum, n): (f64, f64)| if n >= SHORT_LINE { sum / n } else { f64::NAN };
     let sharp = |w: &[f64]| ((w[1] - 0.5 * (w[0] + w[2])) * (2.0f64 / 3.0).sqrt()) as f32;
@@ -127,19 +125,19 @@ fn sharp_lines(image: &[f32], width: usize) -> [Vec<f32>; 2] {
     })
 }
 
-/// Heads or tails for each pixel of the picture: a pattern whose variance is 1 wherever it is seen.
+/// A random sign for each pixel of the picture: a pattern of variance 1 wherever it is seen.
 fn coins(pixels: usize) -> Vec<f32> {
     let mut rng = Seed(0).stream("diagnose/still");
     (0..pixels).map(|_| if rng.random() { 1.0 } else { -1.0 }).collect()
 }
 
-/// The coins where the view has a mean.
+/// The coins at the pixels where the view has a mean.
 fn tossed(field: &Field, coins: &[f32]) -> Vec<f32> {
     let pixels = field.pixels.iter().zip(&field.mean);
     pixels.map(|(&i, mean)| if mean.is_finite() { coins[i as usize] } else { f32::NAN }).collect()
 }
 
-/// Of each view's values with the mean of the others'.
+/// Mean product of each view's values with the others'.
 fn across_views(means: &[&[f32]], min_pairs: f64) -> Vec<Option<Product>> {
     let n = means.iter().map(|image| image.len()).max().unwrap_or(0);
     let mut sum = vec![0f32; n];
@@ -153,7 +151,7 @@ fn across_views(means: &[&[f32]], min_pairs: f64) -> Vec<Option<Product>> {
         }
     }
     let of = |image: &&[f32]| {
-        // Pixels that many views saw say more.
+        // Pixels seen by more views weigh more.
         let (mut products, mut squares) = (0.0, 0.0);
         let (mut pairs, mut squared, mut both) = (0.0, 0.0, 0.0);
         for ((&s, &c), &r) in sum.iter().zip(&count).zip(*image) {
@@ -189,7 +187,7 @@ mod tests {
 
     const SIDES: [usize; 6] = [36, 48, 60, 100, 160, 220];
 
-    /// What is measured without noise, on targets of very different sizes, with this error at each pixel.
+    /// Measures targets of very different sizes, without noise, with this error at each pixel.
     fn measured(pattern: impl Fn(usize) -> f64) -> Vec<Still> {
         let camera = kinect_v1(1).camera;
         let (width, height) = (camera.width, camera.height);
@@ -210,15 +208,14 @@ mod tests {
         still(&beside_bias(&fields, &[]), &KeptPattern::of(&fields))
     }
 
-    /// The same: what pixels, columns, rows and means over a few pixels have in common, over the error's variance.
+    /// Same, relative to the error's variance: pixels, columns, rows and means over a few pixels.
     fn seen(pattern: impl Fn(usize) -> f64) -> Vec<[f64; 4]> {
         let all = |s: &Still| [s.fixed_px2, s.lines_px2[0], s.lines_px2[1], s.blotches_px2];
         let of_view = |s: &Still| all(s).map(|px2| px2.expect("large enough"));
         measured(pattern).iter().map(|s| of_view(s).map(|px2| px2 / PATTERN_PX.powi(2))).collect()
     }
 
-    /// Of the variance of pixels up or down the means that are taken out take 4 to 9 % (numpy), and lines
-    /// share nothing.
+    /// The means subtracted take 4 to 9 % of the variance of random signs (numpy), and lines share nothing.
     #[test]
     fn a_pattern_keeps_its_size_on_small_targets() {
         let mut rng = Seed(5).stream("still");
@@ -226,7 +223,7 @@ mod tests {
         let mut toss = || if rng.random_bool(0.5) { PATTERN_PX } else { -PATTERN_PX };
         let pattern: Vec<f64> = (0..size.width * size.height).map(|_| toss()).collect();
         let seen = seen(|i| pattern[i]);
-        // The coins' own products, of pixels that are not the same, make three hundredths on the smallest.
+        // The coins' own products of different pixels add up to 0.03 on the smallest.
         for [fixed, columns, rows, _] in &seen {
             let of_lines = columns.abs().max(rows.abs());
             assert!((fixed - 1.0).abs() < 0.05 && of_lines < 0.05, "{seen:?}");
@@ -235,8 +232,8 @@ mod tests {
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
     }
 
-    /// Of 60 patterns that are drawn afresh: the scatter of a pattern's variance, and of what its lines and its means
-    /// over a few pixels have in common, is as said. The coins, which are the same for all, err as one of them.
+    /// Over 60 independent patterns, the variance of a pattern and what its lines and its means over a few
+    /// pixels share scatter as stated. The coins, the same for all, have the error of one pattern.
     #[test]
     fn a_pattern_is_a_sample_of_its_pixels() {
         const PATTERNS: usize = 60;
@@ -274,17 +271,18 @@ mod tests {
             };
             let (off, said) = (mean_of(&|[off, _]| *off), mean_of(&|[_, said]| *said));
             let scatter = mean_of(&|[x, _]| (x - off).powi(2)).sqrt();
-            // Of the lines and the means the pattern's own is one of two equal parts.
+            // For lines and means, the pattern's own error is one of two equal parts.
             let own = if k < 3 { said / 2f64.sqrt() } else { said };
-            // A scatter by 60 errs by a tenth; what all are off by is the coins', thrice in 400.
+            // A scatter of 60 has an error of a tenth. The common offset is the
+            // coins'; 3 in 400 are too large.
             assert!((0.7..1.3).contains(&(scatter / own)), "{k}: {scatter}, said {own}");
             assert!(off.abs() < 3.0 * own, "{k}: off by {off}, said {own}");
         }
     }
 
-    /// A wave across the picture, 16 px from crest to crest along its diagonal: what is left of it by means over 7 px
-    /// and beside means over 49, both in one dimension along either axis, squared. A pattern of single pixels has no
-    /// part in it.
+    /// A wave of 16 px along the diagonal of the picture: what means over 7 px leave of it, less
+    /// means over 49 px, both in one dimension along either axis, squared. A pattern of single
+    /// pixels contributes nothing.
     #[test]
     fn waves_between_pixels_and_what_is_smooth_are_blotches() {
         let width = kinect_v1(1).camera.width;
@@ -305,8 +303,8 @@ mod tests {
         assert!(seen(|i| pixels[i]).iter().all(|s| s[3].abs() < 0.01));
     }
 
-    /// Every second column is two heights off its neighbours: 2/3 of four times the columns' variance. Means
-    /// over 49 and 7 px are 1/49 and -1/7 of the column's own error.
+    /// Columns alternate by two heights: 2/3 of four times their variance. Means over 49 and 7 px are 1/49
+    /// and -1/7 of a column's own error.
     #[test]
     fn columns_of_two_readouts_are_lines_and_no_pattern() {
         let width = kinect_v1(1).camera.width;
@@ -318,7 +316,7 @@ mod tests {
         }
     }
 
-    /// Bands of many columns are shapes of the mean's: what one is off by makes few lines.
+    /// Bands of many columns are shapes of the mean residual and hardly show in single lines.
     #[test]
     fn wide_bands_are_no_single_lines() {
         let width = kinect_v1(1).camera.width as f64;

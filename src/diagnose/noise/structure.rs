@@ -1,6 +1,6 @@
-//! How the noise hangs together: between neighbours, frames, rows, and views.
+//! Structure of the noise: correlation between neighbours, frames, rows and views.
 //!
-//! Every statistic is one number a view, so that views are the sample.
+//! Every statistic is one number per view, so the views are the sample.
 
 use rayon::prelude::*;
 
@@ -18,89 +18,88 @@ use crate::diagnose::views::box_sums::repeats_of_box;
 use crate::diagnose::views::field::Field;
 use crate::stats::{Correlation, LONGEST_LAG, mean};
 
-/// What one view tells; `None` where it cannot.
+/// Statistics of one view; `None` where it cannot show them.
 #[derive(Debug, Clone, Default)]
 pub struct Structure {
-    /// Pixels that were looked at.
+    /// Number of pixels used.
     pub pixels: f64,
-    /// Variance of the first frame's rough residual, px^2.
+    /// Variance of the first frame's high-passed residual, px^2.
     pub variance_px2: f64,
-    /// Side of the window that would make the correlation, px.
+    /// Side of the window that would cause the correlation, px.
     pub window_px: Option<f64>,
-    /// Correlation of pixels 1, 2, 3, ... apart of what changes between frames, beyond that of far
-    /// ones.
+    /// Correlation of the changes between frames at lags of 1, 2, 3, ... px, beyond that at far lags.
     pub correlation_profile: Option<[f64; PROFILE_LAGS]>,
-    /// Mean correlation of near pixels of what changes between frames.
+    /// Mean correlation of near pixels in the changes between frames.
     pub neighbour_correlation: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
     pub lagged: [Option<f64>; 3],
-    /// Logarithm of each of the first frames' variance over that of the others.
+    /// Log ratio of each of the first frames' variance to that of the others.
     pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
-    /// Pixels that all of these frames measured.
+    /// Number of pixels that all of these frames measured.
     pub frame_pixels: f64,
-    /// What the mean residual has in common with the other views'.
+    /// Covariance of the mean residual with the other views'.
     pub still: Still,
-    /// Variance that a row (a column) of one frame shares, px^2.
+    /// Variance common to a row (a column) of one frame, px^2.
     pub row_px2: Option<f64>,
     pub column_px2: Option<f64>,
-    /// Pairs of pixels that tell it of rows, and of columns, each met twice.
+    /// Number of pixel pairs behind it in rows and in columns, each counted twice.
     pub line_pairs: [f64; 2],
-    /// Of the frames' means about a line in time.
+    /// Means of the frames about a line in time.
     pub jitter: Option<Jitter>,
-    /// Of the frames' slopes over the picture.
+    /// Slopes of the frames over the picture.
     pub tilts: Option<Squares>,
     /// Residuals beyond four local standard deviations.
     pub tails: TailCounts,
-    /// The places where such lie.
+    /// Number of places where they lie.
     pub far_places: f64,
-    /// Of the residuals near the middle, for tails too weak to count.
+    /// Moments of the residuals near the middle, for tails too weak to count.
     pub moments: Moments,
-    /// Mean standard deviation of the disparity over the disparity.
+    /// Mean ratio of the disparity's standard deviation to the disparity.
     pub relative_sigma: f64,
 }
 
 impl Structure {
-    /// Share beyond four local standard deviations, where enough was looked at.
+    /// Share beyond four local standard deviations; `None` with too few readings.
     pub fn tail_share(&self) -> Option<f64> {
         (self.tails.n > MIN_READINGS).then(|| self.tails.share())
     }
 
-    /// Excess kurtosis of the disparity, and of the depth: of an error e of the disparity d that is e / (1 + e / d), to
-    /// second order of the noise's size over d.
+    /// Excess kurtosis of the disparity and of the depth, to second order in the relative noise. An error e
+    /// of the disparity d is e / (1 + e / d) in the depth.
     pub fn excess(&self) -> Option<[f64; 2]> {
         let (disparity, skewness) = (self.moments.excess()?, self.moments.skewness()?);
         let s = self.relative_sigma;
         Some([disparity, disparity + 24.0 * s * (3.0 * s - skewness)])
     }
 
-    /// Pixels that a square of the noise is shared by: the squared correlation of a box sums to this.
+    /// Number of pixels per independent squared residual: the sum of a box's squared correlation.
     pub fn repeats(&self) -> f64 {
         repeats_of_box(self.window_px.unwrap_or(1.0).max(1.0))
     }
 
-    /// Skewness of the disparity, and of the depth: of noise of s times the disparity 6 s less.
+    /// Skewness of the disparity and of the depth; for noise of s times the disparity the latter is 6 s less.
     pub fn skewness(&self) -> Option<[f64; 2]> {
         let disparity = self.moments.skewness()?;
         Some([disparity, disparity - 6.0 * self.relative_sigma])
     }
 
-    /// What the share of the variance that rows have in common (columns: 1) errs by where they have none: as the mean of
-    /// so many products of two pixels that lie apart. Through a window of the side W, products next to one
-    /// another along the line repeat as W times its pixels do, at both ends, and as their squares across it.
+    /// Standard error of the share of the variance common to rows (columns: 1) where there is none: that of
+    /// the mean of so many products of two distant pixels. With a window of side W, the correlation of the
+    /// products sums to W along the line at either end, and across it to the sum of the squared correlation.
     pub fn line_error(&self, axis: usize) -> f64 {
         let side = self.window_px.unwrap_or(1.0).max(1.0);
         let alike = side * side * self.repeats().sqrt();
         (2.0 * alike / self.line_pairs[axis]).sqrt()
     }
 
-    /// What a view counts by for that variance, in px^2, where all err by `variance_px2` a pixel: no view tells more
-    /// for its readings' being all one word.
+    /// Weight of a view for that variance, px^-4, where a pixel's variance is at least `variance_px2`: a view
+    /// whose readings are all one step gets no extra weight.
     pub fn line_size(&self, axis: usize, variance_px2: f64) -> f64 {
         (self.line_error(axis) * self.variance_px2.max(variance_px2).max(1e-12)).powi(-2)
     }
 
-    /// What the correlation of frames errs by where they have nothing in common beside a pattern of this variance,
-    /// which is by chance larger or smaller at a view's pixels.
+    /// Standard error of the frames' correlation where they share nothing but a pattern of this variance,
+    /// which varies by chance over a view's pixels.
     pub fn lagged_error(&self, pattern_px2: f64) -> f64 {
         let changes = self.lagged.iter().flatten().count() as f64;
         let (share, left) = self.pattern_share(pattern_px2);
@@ -108,26 +107,26 @@ impl Structure {
         (self.repeats() / (self.pixels * changes)).sqrt().hypot(of_pattern)
     }
 
-    /// Correlation of a pixel with itself 1, 2 and 3 frames later of what is left beside a pattern of this variance.
+    /// Correlation of a pixel with itself 1, 2 and 3 frames later, without a pattern of this variance.
     pub fn beside_pattern(&self, pattern_px2: f64) -> [Option<f64>; 3] {
         let (share, left) = self.pattern_share(pattern_px2);
         self.lagged.map(|c| Some((c? - share) / left))
     }
 
-    /// A pattern's share of the variance, and what is left.
+    /// Share of a pattern in the variance, and the rest.
     fn pattern_share(&self, pattern_px2: f64) -> (f64, f64) {
         let share = (pattern_px2.max(0.0) / self.variance_px2.max(1e-12)).min(LARGEST_PATTERN);
         (share, 1.0 - share)
     }
 
-    /// What the correlation of neighbours errs by at most where they have nothing in common: as from one change.
+    /// Largest standard error of the neighbours' correlation where there is none: that of a single change.
     pub fn neighbour_error(&self) -> f64 {
         (2.0 / (NEIGHBOURS as f64 * self.pixels)).sqrt()
     }
 
-    /// How many times the variance of a mean, and of a log variance, exceeds what pixels that hang
-    /// together so say, for a shape that the row decides where rows have an error of their own: along one
-    /// all pixels share it, on a target about as wide as it is high.
+    /// Variance inflation of a mean and of a log variance by row noise, beyond that of pixels with this
+    /// `correlation`, for a shape that varies by row. All pixels along a row share its error, on a
+    /// target about as wide as high.
     pub fn excess_of_rows(&self, correlation: &Correlation) -> [f64; 2] {
         let shared = self.row_share();
         let along = self.pixels.sqrt();
@@ -137,7 +136,7 @@ impl Structure {
         ]
     }
 
-    /// What rows that err as one make of a correlation's sum, as far as it reaches.
+    /// Sum of the correlation that row noise causes, up to the longest lag.
     pub fn row_correlation(&self) -> f64 {
         1.0 + 2.0 * LONGEST_LAG as f64 * self.row_share()
     }
@@ -146,8 +145,8 @@ impl Structure {
         self.row_px2.unwrap_or(0.0).max(0.0) / self.variance_px2.max(1e-12)
     }
 
-    /// How many times the variance of a mean of this and other `views` exceeds what each alone says, where their
-    /// pixels have this error in common; `frames` are worth one noise each.
+    /// Variance inflation of the mean of this and the other `views` where their pixels share an error of
+    /// variance `px2`; each of the `frames` has its own noise.
     pub fn excess_of_pattern(
         &self,
         px2: f64,
@@ -160,10 +159,10 @@ impl Structure {
     }
 }
 
-/// Of a view that is hardly anything else, px^2 by px^2, nothing is known beside the pattern.
+/// Largest share of a pattern in the variance: beyond it the rest of a view's noise is unknown.
 const LARGEST_PATTERN: f64 = 0.95;
 
-/// Measure all views. `bias` has, view by view, what is known to be no noise, px (or is empty).
+/// Measures all views. `bias` is their known bias, px by view and pixel (or empty).
 pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Vec<Structure> {
     let views = beside_bias(fields, bias);
     let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, b)).collect();
@@ -202,7 +201,7 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     let shares = [share(s.row_px2), share(s.column_px2)];
     let window = area(&moving(&frames, s.lagged[0]), field.width, shares);
     s.window_px = Some(window.sqrt());
-    // A part of the noise that comes through a window is too little to see lag by lag.
+    // A window for only part of the noise is too weak to see lag by lag.
     let box_px = (2.0 * REACH_PX as f64 + 1.0).powi(2);
     let near = 1.0 + (box_px - 1.0) * s.neighbour_correlation.unwrap_or(0.0);
     let of_mean_px2 = frame_mean_px2(field, &s, window.max(near));
@@ -213,27 +212,27 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     s
 }
 
-/// What the pixels' own noise, and the rows', makes a frame's mean err by, px^2.
+/// Variance of a frame's mean due to the noise of its pixels and rows, px^2.
 fn frame_mean_px2(field: &Field, s: &Structure, correlation_sum: f64) -> f64 {
     let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);
     let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
     own + s.row_px2.unwrap_or(0.0).max(0.0) / rows(field)
 }
 
-/// Rows from the target's first to its last.
+/// Number of rows from the target's first to its last.
 fn rows(field: &Field) -> f64 {
     let ends = field.pixels.last().zip(field.pixels.first());
     ends.map_or(1.0, |(last, first)| f64::from(last - first) / field.width as f64 + 1.0)
 }
 
-/// What is left of the `power` without what rows and columns share, px^2.
+/// Part of `power` that rows and columns do not share, px^2.
 fn beside_lines(power: f64, lines: [Option<f64>; 2]) -> f64 {
     let shared: f64 = lines.iter().flatten().map(|px2| px2.max(0.0)).sum();
     (power - shared).max(1e-12)
 }
 
-/// Correlation of pixels 1, 2, 3, ... apart along rows and columns, without what far ones and whole
-/// `lines` share, px^2.
+/// Correlation at lags of 1, 2, 3, ... px along rows and columns, without that at far lags and without the
+/// variance common to whole lines, px^2.
 fn correlation_profile(
     changes: &[Vec<f32>],
     width: usize,
@@ -245,8 +244,7 @@ fn correlation_profile(
             filled.iter().map(|c| covariance(c, width, lags, step)).collect();
         mean(all?.into_iter())
     };
-    // Taking out what is smooth leaves a little of everything everywhere: what a diagonal shows is
-    // no window's.
+    // The high-pass leaves a little correlation everywhere: what the diagonal shows is not a window's.
     let apart = over(&FAR, [1, 1])?;
     let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)))?;
     let power = beside_lines(power, [row, column]);
@@ -266,8 +264,8 @@ mod tests {
     use super::*;
     use crate::rng::Seed;
 
-    /// A square of white pixels whose rows err by half as much each: the variance of a row's mean, and
-    /// of its mean square, over that of as many pixels that have nothing in common.
+    /// A square of white pixels whose rows share an error half as large: variance of a row's mean, and of its
+    /// mean square, over that of as many independent pixels.
     #[test]
     fn rows_that_err_alike_are_worth_less() {
         const SIDE: usize = 60;
@@ -296,15 +294,15 @@ mod tests {
             ..Structure::default()
         };
         for (got, truth) in s.excess_of_rows(&Correlation::white()).iter().zip(truth) {
-            // A pixel has itself in common with its row: one of sixty.
+            // The pixel itself is one of the sixty in its row.
             assert!((got / truth - 1.0).abs() < 0.06, "{got}, by simulation {truth}");
         }
         let none = Structure { row_px2: Some(-1e-4), ..s };
         assert_eq!(none.excess_of_rows(&Correlation::white()), [1.0; 2]);
     }
 
-    /// Means over six views whose pixels have an error in common, by simulation: 5,000 of them scatter as
-    /// said to 4 %, twice what such a scatter errs by.
+    /// Means over six views whose pixels share an error, simulated 5,000 times: they scatter as stated to
+    /// 4 %, twice the standard error of such a scatter.
     #[test]
     fn views_with_a_pattern_in_common_are_worth_fewer() {
         const VIEWS: usize = 6;

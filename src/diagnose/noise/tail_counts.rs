@@ -1,17 +1,17 @@
-//! How many residuals lie how far out, in standard deviations of their patch.
+//! Counts residuals by size, in standard deviations of their patch.
 
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 
-/// A Gaussian's share beyond four standard deviations.
+/// Share of a Gaussian beyond four standard deviations.
 pub const GAUSSIAN_TAIL: f64 = 6.334e-5;
 const TAIL_SIGMAS: f32 = 4.0;
-/// Views too small to show a tail, in readings.
+/// Fewest readings of a view that can show a tail.
 pub const MIN_READINGS: f64 = 5000.0;
-/// What lies beyond the last is no tail of the noise: a few such errors would decide its mean.
+/// Bin edges. Residuals beyond the last are no tail of the noise: a few of them would decide its mean.
 pub const TAIL_EDGES: [f64; 6] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0];
 
-/// How many residuals were looked at, and how many lie between each two of [`TAIL_EDGES`], in
-/// standard deviations of their patch; beyond the first, whatever their size, in all.
+/// Number of residuals, of those beyond the first of [`TAIL_EDGES`], and of those between each two edges, in
+/// standard deviations of their patch.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TailCounts {
     pub n: f64,
@@ -26,7 +26,7 @@ impl TailCounts {
         self.between.iter_mut().zip(other.between).for_each(|(a, b)| *a += b);
     }
 
-    /// Share beyond the first edge.
+    /// Share of the residuals beyond the first edge.
     pub fn share(&self) -> f64 {
         self.beyond / self.n.max(1.0)
     }
@@ -41,8 +41,8 @@ impl TailCounts {
     }
 }
 
-/// The tail of an image's residuals: row by row, `width` px a row, NaN where there is none. Pixels beyond the first
-/// edge are marked as `far`.
+/// Counts the tail of an image's residuals: row-major, `width` px wide, NaN where there is none. Marks pixels
+/// beyond the first edge as `far`.
 pub fn tail(image: &[f32], width: usize, far: &mut [bool]) -> TailCounts {
     let mut counts = TailCounts::default();
     for patch in patches(image, width) {
@@ -55,8 +55,8 @@ pub fn tail(image: &[f32], width: usize, far: &mut [bool]) -> TailCounts {
     counts
 }
 
-/// Places of `far` pixels, row by row, `width` px a row: neighbours are one place, so that a speck that every frame
-/// has is one error and not many.
+/// Number of connected groups of `far` pixels, row-major, `width` px wide. A speck in every frame is
+/// then one error, not many.
 pub fn places(mut far: Vec<bool>, width: usize) -> f64 {
     let (mut places, mut queue) = (0.0, Vec::new());
     for start in 0..far.len() {
@@ -80,22 +80,21 @@ pub fn places(mut far: Vec<bool>, width: usize) -> f64 {
     places
 }
 
-/// So many patches fit across the picture ...
+/// Number of patches across the picture ...
 const PATCHES_ACROSS: usize = 7;
-/// ... unless their sides would be shorter than this, px.
+/// ... unless they would be narrower than this, px.
 const SMALLEST_PATCH: usize = 40;
 
-/// The pixels of a patch that have a residual, and their standard deviation; what strays has no say in
-/// it.
+/// Pixels of a patch that have a residual, and their robust standard deviation.
 pub struct Patch {
     pub pixels: Vec<usize>,
     pub sigma: f32,
-    /// The words are so coarse that the median says less than the bulk's spread.
+    /// Whether steps are so coarse that the median says less than the spread of the bulk.
     pub coarse: bool,
 }
 
-/// Those of an image that are a quarter full or more: row by row, `width` px a row, in any unit, NaN
-/// where there is no residual.
+/// Patches of an image that are at least a quarter full. The image is row-major, `width` px wide, in any
+/// unit, NaN where there is no residual.
 pub fn patches(image: &[f32], width: usize) -> impl Iterator<Item = Patch> + '_ {
     let side = (width / PATCHES_ACROSS).max(SMALLEST_PATCH);
     let height = image.len() / width.max(1);
@@ -111,12 +110,12 @@ pub fn patches(image: &[f32], width: usize) -> impl Iterator<Item = Patch> + '_ 
         }
         let mut sizes: Vec<f32> = pixels.iter().map(|i| image[*i].abs()).collect();
         let mad = MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
-        // Coarse words make the median jump; the bulk's own spread bounds it below.
+        // Coarse steps make the median jump; the spread of the bulk is a lower bound.
         let end = sizes.len() * 9 / 10;
         sizes.select_nth_unstable_by(end, f32::total_cmp);
         let most = &sizes[..end];
         let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
-        // The inner nine tenths of a Gaussian have .6225 of its variance.
+        // The inner 90 % of a Gaussian have .6225 of its variance.
         let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
         let sigma = mad.max(0.8 * spread);
         let coarse = mad < sigma;

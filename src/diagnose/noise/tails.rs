@@ -1,4 +1,4 @@
-//! Residuals beyond four standard deviations: how many, and whether they are too many.
+//! Tests for heavy tails: the number of residuals beyond four standard deviations, and the fourth moment.
 
 use serde_json::{Map, json};
 
@@ -13,33 +13,33 @@ use crate::diagnose::finding::parameters::estimate;
 use crate::diagnose::views::known::KnownTerms;
 use crate::terms::{Axis, Statistic};
 
-/// Standard errors that a model's scale may be off by.
+/// Allowed error of a model's scale, in standard errors.
 pub const SURE_SCALE_ERRORS: f64 = 2.0;
-/// A tail is heavy from this many times a Gaussian's share on.
+/// Multiple of a Gaussian's share beyond 4 sigma from which a tail is heavy.
 const HEAVY: f64 = 2.5;
-/// So much more where the size of the noise is uneven.
+/// Additional factor where the noise level is uneven.
 const MUCH_HEAVIER: f64 = 6.0;
-/// A wide part that is not wider than this, in two standard errors, is noise of uneven size: light that
-/// is known to an octave at the edges of a print leaves a factor of 1.4 of shot noise.
+/// A wide component whose scale is not above this by two standard errors is noise of uneven level: light
+/// known to an octave at the edges of a print leaves a factor of 1.4 in shot noise.
 const UNEVEN_SCALE: f64 = 1.5;
-/// So heavy it may look without a cause.
+/// Multiple of that share that may occur without a cause.
 const UNEQUAL: f64 = 1.5;
 
-/// What makes residuals look heavy-tailed where their noise is not.
+/// Conditions under which residuals look heavy-tailed although the noise is not.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Confusers {
-    /// The noise is of unequal size where no law was found for it.
+    /// The noise level is uneven in a way for which no law was found.
     pub uneven: bool,
-    /// The views are a simulation's, or are compared with one: a simulation by formula lacks the
-    /// unevenness from pixel to pixel that light brings, so that the two differ without heavy tails.
+    /// The views are simulated or compared with simulated ones. A simulation by formula lacks the
+    /// pixel-to-pixel unevenness that light causes, so the two differ without heavy tails.
     pub simulated: bool,
-    /// The words step: how far out a view's residuals lie goes with where its words fall.
+    /// The raw values are quantised: how far out a view's residuals lie depends on where its steps fall.
     pub stepped: bool,
 }
 
-/// Are the residuals' tails heavier than a Gaussian's?
+/// Tests whether the residuals have heavier tails than a Gaussian.
 ///
-/// Heavy ones show far out, weak ones in the fourth moment.
+/// Heavy tails show far out, weak ones in the fourth moment.
 pub fn tails(
     views: &[Structure],
     known: &KnownTerms,
@@ -53,7 +53,7 @@ pub fn tails(
     }
     let own = mixture.map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, SURE_SCALE_ERRORS).max(GAUSSIAN_TAIL));
     let share = ViewMean::of(views, Structure::tail_share)?;
-    // Patches of unequal noise, and steps of the words, make a tail of a Gaussian too.
+    // Patches of unequal noise, and quantisation steps, give a Gaussian a tail too.
     let much = if confusers.uneven { MUCH_HEAVIER } else { 1.0 };
     let expected = much * UNEQUAL * own;
     let mut parameters = Map::new();
@@ -62,7 +62,7 @@ pub fn tails(
     if share.value >= heavy && share.p_above(expected) <= level {
         return far_out(views, parameters, own, share.p_above(own), confusers);
     }
-    // The second test of tails at this level.
+    // Second test of tails at this level.
     let of_some = || tailed_views(views, expected, heavy);
     let comparable = !confusers.stepped && !confusers.simulated;
     let of_some = comparable.then(of_some).flatten();
@@ -74,7 +74,7 @@ pub fn tails(
     if looked { weak(views, level, parameters) } else { None }
 }
 
-/// What is counted far out in these views; `own` is the model's share.
+/// Finding from the counts far out in these views; `own` is the model's share.
 fn far_out(
     views: &[Structure],
     mut parameters: Map<String, serde_json::Value>,
@@ -86,7 +86,7 @@ fn far_out(
     parameters.insert("share_beyond_4_sigma".into(), json!(share.value));
     let mut counts = TailCounts::default();
     views.iter().filter(|s| s.tail_share().is_some()).for_each(|s| counts.add(&s.tails));
-    // Where all that strays is gross it has no scale.
+    // Gross errors alone have no scale.
     let mut size_sigma = 4.0 * share.value.sqrt();
     if let Some(Outliers { fraction, scale }) = outliers(&counts, share.std_error / share.value) {
         if confusers.uneven && scale[0] - 2.0 * scale[1] < UNEVEN_SCALE {
@@ -107,31 +107,30 @@ fn far_out(
     })
 }
 
-/// Readings that were looked at, by how much of the noise is a pixel's own: what a box of neighbours shares is far
-/// out in all of them.
+/// Effective number of independent readings: the pixels that share a window are far out together.
 fn independent_readings(view: &Structure) -> f64 {
     view.tails.n / view.repeats()
 }
 
-/// Share of the readings that weak tails are said to be drawn from: a moment gives one number, and the
-/// catalogue's mixture has two.
+/// Fraction reported for weak tails: the moment gives one number, the catalogue's mixture has two.
 const WEAK_FRACTION: f64 = 0.1;
 
-/// Tails too weak to count, by the fourth moment. It is the third test of tails at this level, so that
-/// its chance is trebled.
+/// Weak tails, by the fourth moment. This is the third test of tails at this level,
+/// so its p-value is trebled.
 fn weak(
     views: &[Structure],
     level: f64,
     mut parameters: Map<String, serde_json::Value>,
 ) -> Option<TextureFinding> {
-    // What is Gaussian in the disparity or in the depth has no tails.
+    // Noise that is Gaussian in the disparity or in the depth has no tails.
     let each = [0, 1].map(|k| ViewMean::of(views, |s| Some(s.excess()?[k])));
     let excess = each.into_iter().flatten().min_by(|a, b| a.value.total_cmp(&b.value))?;
     let p = 3.0 * excess.p_above(0.0);
     if p > level {
         return None;
     }
-    // A mixture has 3 f (1 - f) x^2 / (1 + f x)^2, where its wide part has 1 + x times the variance.
+    // Excess of a mixture: 3 f (1 - f) x^2 / (1 + f x)^2, where the wide component has
+    // 1 + x times the variance.
     let root = |k: f64| (k.max(0.0) / (3.0 * WEAK_FRACTION * (1.0 - WEAK_FRACTION))).sqrt();
     let scale = |k: f64| {
         let r = root(k);
@@ -145,7 +144,7 @@ fn weak(
     Some(TextureFinding {
         interval: [2.0, TAIL_EDGES[0]],
         parameters,
-        // Of the wide part's variance beyond the noise's, the share that is drawn from it.
+        // Root of the variance that the wide component adds, by its fraction.
         size_sigma: (WEAK_FRACTION * (scale(k).powi(2) - 1.0)).sqrt(),
         p,
         nats: nats(&excess, 0.0),
@@ -153,7 +152,7 @@ fn weak(
     })
 }
 
-/// Of what lies between the edges, a bin's middle standing for it; at least five.
+/// Mean size of the residuals between the edges, each at the middle of its bin; five where there are none.
 fn mean_size(counts: &TailCounts) -> f64 {
     let all: f64 = counts.between.iter().sum();
     let middles = TAIL_EDGES.windows(2).map(|w| 0.5 * (w[0] + w[1]));
@@ -169,13 +168,13 @@ mod tests {
 
     const VIEWS: usize = 14;
 
-    /// A Gaussian's own share beyond four deviations is no tail; a tenth of a per cent is one.
+    /// A Gaussian's own share beyond four standard deviations is no heavy tail; 0.2 % is one.
     #[test]
     fn tails_are_heavy_when_most_views_have_them() {
         let tailed = |share: f64, of: usize| -> Vec<Structure> {
             let view = |k: usize| {
                 let (tail, n) = (if k < of { share } else { GAUSSIAN_TAIL }, 50_000.0);
-                // As exponential as a tail of matches gone astray.
+                // Roughly exponential, like a tail of false matches.
                 let between = [0.4, 0.24, 0.2, 0.12, 0.03].map(|part| part * n * tail);
                 let tails = TailCounts { n, beyond: n * tail, between };
                 Structure { tails, far_places: n * tail, ..Structure::default() }
@@ -197,7 +196,7 @@ mod tests {
         assert!(of(2, Confusers::default()).is_none(), "in two odd views only");
         let some = of(4, Confusers::default()).expect("in some views");
         assert_eq!(some.words, Some(format!("in 4 of {VIEWS} views")));
-        // Of steps, and beside a simulation, views differ by themselves.
+        // With quantisation steps, and next to a simulation, views differ anyway.
         for confusers in [
             Confusers { stepped: true, ..Confusers::default() },
             Confusers { simulated: true, ..Confusers::default() },
@@ -214,8 +213,8 @@ mod tests {
         assert!(tails(&tailed(2e-3, VIEWS), &known, 1e-3, Confusers::default()).is_none());
     }
 
-    /// Weak tails, with hardly anything far out: a Student's t is seen by its fourth moment unless the
-    /// noise is uneven anyway, or a simulation's; a Gaussian and a Gaussian of uneven size are not.
+    /// Weak tails with hardly anything far out: the fourth moment shows a Student's t, unless the noise is
+    /// uneven anyway or a simulation's. It shows neither a Gaussian nor a Gaussian of uneven level.
     #[test]
     fn weak_tails_are_seen_by_the_fourth_moment() {
         let student = StudentT::new(80.0).expect("a distribution");
@@ -232,11 +231,11 @@ mod tests {
         assert_eq!(found.families, ["heavy-tails"]);
         let [fraction, scale, excess] = ["fraction", "scale", EXCESS]
             .map(|name| found.parameters[name]["value"].as_f64().expect("a number"));
-        // The mixture that is told has the excess that was measured.
+        // The reported mixture has the measured excess.
         let x = fraction * (scale * scale - 1.0);
         let had = 3.0 * (1.0 - fraction) / fraction * (x / (1.0 + x)).powi(2);
         assert!((had / excess - 1.0).abs() < 1e-3, "{had} {excess}");
-        // Of noise that is no small part of the depth, in that as well.
+        // For noise that is no small part of the depth, also in the depth.
         const S: f64 = 0.035;
         assert!(told(&heavy(S), false, false).is_some());
         let in_depth = |s: f64| {

@@ -1,4 +1,4 @@
-//! Heavy tails that some of the views have and the others have not: of those a mean over all tells little.
+//! Detects heavy tails that only some of the views have; a mean over all views would hide them.
 
 use statrs::distribution::{DiscreteCDF, Poisson};
 
@@ -7,18 +7,18 @@ use super::structure::Structure;
 use super::tail_counts::{MIN_READINGS, TAIL_EDGES};
 use crate::stats::{at_least, normal_beyond};
 
-/// A view has tails where as many are this improbable.
+/// A view has tails where so many far readings have a probability below this.
 const CLEAR: f64 = 1e-3;
 
-/// Views with tails that the others have not.
+/// Views with tails that the others do not have.
 pub struct TailedViews {
     pub views: Vec<Structure>,
-    /// Chance that so many are so far beyond what was expected.
+    /// P-value of so many views so far above the expected share.
     pub p: f64,
 }
 
-/// The views whose share beyond four sigma is above `heavy`, if they are more than odd ones. By the noise alone
-/// a share of up to `expected` is.
+/// Views whose share beyond four sigma is above `heavy`, if there are at least [`min_views`] of them. Noise
+/// alone has a share of up to `expected`.
 pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<TailedViews> {
     let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > MIN_READINGS).collect();
     let tailed = |s: &&&Structure| {
@@ -31,8 +31,8 @@ pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<Ta
     Some(TailedViews { views: tailed, p: order_statistic(&looked, expected)? })
 }
 
-/// How many times its share a Gaussian of the depth has beyond four sigma of the disparity: of noise x of s times the
-/// disparity that becomes x / (1 - s x).
+/// Factor on the share beyond four sigma of the disparity for noise that is Gaussian in the depth: noise x of
+/// s times the disparity becomes x / (1 - s x).
 fn bent(view: &Structure) -> f64 {
     let far = TAIL_EDGES[0];
     let s = far * view.relative_sigma.min(MAX_RELATIVE);
@@ -40,17 +40,18 @@ fn bent(view: &Structure) -> f64 {
     sides / (2.0 * normal_beyond(far))
 }
 
-/// Noise of a quarter of the disparity has no disparity four sigma out.
+/// Limit of the relative noise: at a quarter, four sigma below the disparity is zero.
 const MAX_RELATIVE: f64 = 0.2;
 
-/// That a view has so many places with far readings or more; of those that hang together one counts. There are no more
-/// places than far readings: through a window of 5 px most places of noise have one or two, not as many as share it.
+/// P-value of a view's number of places with far readings; connected readings count once. The expected number
+/// of readings bounds that of places: through a window of 5 px most places hold one or two readings, not as
+/// many as share the window.
 fn chance(view: &Structure, expected: f64) -> Option<f64> {
     let poisson = Poisson::new(expected * bent(view) * view.tails.n).ok()?;
     Some((view.far_places as u64).checked_sub(1).map_or(1.0, |fewer| poisson.sf(fewer)))
 }
 
-/// Chance that the fewest views that count are all as improbable as the last of them.
+/// P-value of the [`min_views`]-th smallest of the views' p-values.
 fn order_statistic(views: &[&Structure], expected: f64) -> Option<f64> {
     let all = views.iter().filter_map(|s| chance(s, expected));
     let mut chances: Vec<f64> = all.collect();
@@ -95,7 +96,7 @@ mod tests {
         }
     }
 
-    /// Of sessions with as many as are expected, in all views, one in a hundred is found at that level.
+    /// With the expected share in all views, one session in a hundred is found at that level.
     #[test]
     fn what_is_expected_is_found_as_often_as_its_level_says() {
         let mut rng = Seed(4).stream("tails-of-some/null");
@@ -105,11 +106,12 @@ mod tests {
             order_statistic(&views.iter().collect::<Vec<_>>(), expected).unwrap()
         };
         let seen = (0..4000).filter(|_| chance() < 0.01).count();
-        // Binomial: 40, give or take 6.3; that counts are whole numbers makes it fewer.
+        // Binomial: 40 +- 6.3; whole-number counts make it fewer.
         assert!((5..60).contains(&seen), "{seen}");
     }
 
-    /// A million Gaussian depths of relative noise 3 %: their disparities beyond four sigma, to the root of their number.
+    /// A million Gaussian depths of relative noise 3 %: number of disparities beyond four
+    /// sigma, to four times its root.
     #[test]
     fn what_is_gaussian_in_the_depth_has_its_share_in_the_disparity() {
         const S: f64 = 0.03;
@@ -125,8 +127,9 @@ mod tests {
         assert!((bent(&Structure::default()) - 1.0).abs() < 1e-12);
     }
 
-    /// Noise through a window of 5 px is no more often far out than white noise, but in clumps: of 400 views no more than
-    /// one in a hundred is that improbable. With readings counted for one in what shares them, 100 would be.
+    /// Noise through a window of 5 px is far out no more often than white noise, but in clumps: of 400
+    /// views no more than one in a hundred is that improbable. With one count for all readings that
+    /// share a window, 100 would be.
     #[test]
     fn windows_make_no_tails() {
         const SIZE: [usize; 2] = [160, 120];
@@ -149,7 +152,7 @@ mod tests {
         };
         let improbable = |_: &u32| chance(&view(), GAUSSIAN_TAIL).unwrap() < 0.01;
         let found = (0..400).filter(improbable).count();
-        // Binomial: 4, give or take 2.
+        // Binomial: 4 +- 2.
         assert!(found <= 12, "{found} of 400");
     }
 

@@ -1,4 +1,4 @@
-//! Structures that were made up: what they amount to, and how often noise alone amounts to it.
+//! Findings from synthetic structures, and how often noise alone gives one.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -23,7 +23,7 @@ pub(super) fn normal(rng: &mut Stream) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// A model that knows of one parameter.
+/// A model that knows one parameter.
 fn knowing(id: &str, name: &str, value: f64) -> KnownTerms {
     let mut parameters = Map::new();
     parameters.insert(name.into(), json!(value));
@@ -32,7 +32,7 @@ fn knowing(id: &str, name: &str, value: f64) -> KnownTerms {
     KnownTerms::of(&model, &kinect_v1(1).camera)
 }
 
-/// Statistics of views without any structure, measured with errors.
+/// Statistics of views without any structure, with measurement errors.
 fn plain(rng: &mut Stream) -> Vec<Structure> {
     (0..VIEWS)
         .map(|_| Structure {
@@ -59,7 +59,7 @@ pub(super) fn with(rng: &mut Stream, add: impl FnMut(&mut Structure)) -> Vec<Str
     views
 }
 
-/// Views whose errors are drawn pixel by pixel, of `relative_sigma` times the disparity.
+/// Views with errors drawn pixel by pixel, of `relative_sigma` times the disparity.
 pub(super) fn drawn(
     stream: &str,
     relative_sigma: f64,
@@ -80,8 +80,8 @@ pub(super) fn drawn(
     (0..VIEWS).map(view).collect()
 }
 
-/// An error of `s` times the disparity that is Gaussian in the depth, in units of its size and about its mean, as the
-/// high pass leaves it.
+/// An error of the disparity that is Gaussian in the depth, `s` times the disparity: in units of its size and
+/// about its mean, as the high-pass leaves it.
 pub(super) fn gaussian_in_depth(s: f64, rng: &mut Stream) -> f64 {
     let x = normal(rng);
     x / (1.0 - s * x) - s
@@ -112,7 +112,7 @@ fn structures_of_nothing_amount_to_nothing() {
 
 #[test]
 fn each_structure_has_its_name_and_size() {
-    // Put in (px^2 of 0.04), name, parameter, its value.
+    // Added (to a variance of 0.04 px^2), name, parameter, its value.
     type Add = fn(&mut Structure);
     let cases: [(Add, &str, &str, f64); 4] = [
         (|s| s.window_px = s.window_px.map(|w| 5.0 * w), "spatial-correlation", "length_px", 5.0),
@@ -137,7 +137,7 @@ fn each_structure_has_its_name_and_size() {
             "{name}: {estimate} +- {error}, put {value}"
         );
         assert!(error < 0.1 * value && found[0].p < 1e-6, "{name}: +- {error}, p {}", found[0].p);
-        // What the model knows is no news.
+        // What the model knows is not found again.
         let known = knowing(name, key, value);
         let again = texture_findings(&views, &known, LEVEL);
         assert!(again.is_empty(), "{name} is known: {:?}", names(&again));
@@ -176,8 +176,8 @@ fn a_filter_in_time_is_a_filter_and_is_no_news_when_known() {
     assert!(again.is_empty(), "a known filter is {:?}", names(&again));
 }
 
-/// What changes slowly makes next frames alike: that those farther apart differ more than by chance,
-/// below nothing, is no filter.
+/// Slowly changing noise makes successive frames alike. A fall from no correlation to negative ones, though
+/// larger than chance, is no filter.
 #[test]
 fn a_fall_to_frames_that_differ_is_no_filter() {
     let mut rng = Seed(9).stream("noise/fall");
@@ -192,7 +192,7 @@ fn a_fall_to_frames_that_differ_is_no_filter() {
     assert!(texture_findings(&views, &KnownTerms::default(), LEVEL).is_empty());
 }
 
-/// With two frames a view nobody can say whether noise stands still or fades.
+/// With two frames per view, constant and fading noise cannot be told apart.
 #[test]
 fn two_frames_leave_two_names() {
     let mut rng = Seed(3).stream("noise/two");
@@ -206,7 +206,7 @@ fn two_frames_leave_two_names() {
     assert_eq!(both, ["frozen-noise", "temporal-correlation"]);
 }
 
-/// Columns that move as one, or err by a constant each, have no name, but a statistic and an axis.
+/// Columns that move together, or have a constant error each, have no name, but a statistic and an axis.
 #[test]
 fn columns_that_move_as_one_have_no_name() {
     type Add = fn(&mut Structure);
@@ -225,7 +225,7 @@ fn columns_that_move_as_one_have_no_name() {
     }
 }
 
-/// Frames' means about a line, of 6 frames; `sigma_px` beside what the pixels explain.
+/// Means of 6 frames about a line; `sigma_px` is their scatter beyond what the pixels explain.
 fn jitter(sigma_px: f64, velocity_px: f64, rng: &mut Stream) -> Jitter {
     const FREEDOM: usize = 4;
     let expected_px2 = 1e-6;
@@ -260,7 +260,7 @@ fn jitter_and_motion_are_told_apart() {
     assert_eq!(names(&found), ["target-motion"]);
 }
 
-/// Frames that resemble one another wander to either side; what all views do is a motion.
+/// Correlated frames drift to either side; a drift that all views share is a motion.
 #[test]
 fn motion_is_what_all_views_have_in_common() {
     let resembling = |velocity_px: f64, signed: bool| {
@@ -282,8 +282,8 @@ fn motion_is_what_all_views_have_in_common() {
     assert!((velocity - 0.003).abs() < 3.0 * error && error < 0.001, "{velocity} +- {error}");
 }
 
-/// Each pair of views counts twice: of 400 recordings at 5 % 20 alarms are expected, and more than
-/// 36 have a chance of 3e-4. Without the factor for pairs 51 are.
+/// Each pair of views counts twice: of 400 recordings, 20 false alarms are expected at 5 %, and more than 36
+/// have a chance of 3e-4. Without the factor for pairs there are 51.
 #[test]
 fn what_views_share_errs_as_pairs_do() {
     const OF: usize = 8;

@@ -1,5 +1,4 @@
-//! Images of the noise: what is smooth, still or shared by a line taken out of them, and how their
-//! pixels hang together.
+//! Images of the noise, without what is smooth, constant or common to a line, and their correlation.
 
 use std::borrow::Cow;
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -10,12 +9,12 @@ use crate::diagnose::views::field::Field;
 use crate::stats::measure_correlation;
 use crate::terms::Axis;
 
-/// Frames that resemble one another more than this have little noise of their own.
+/// Correlation of frames above which they have little noise of their own.
 const STILL: f64 = 0.6;
 
-/// An image of the noise as it changes from frame to frame, so that nothing that stands still is
-/// taken for it; the first frame where there is but one, or where nearly all stands still.
-/// `next` is the correlation of a frame with the next.
+/// An image of the noise that changes from frame to frame, so that nothing constant is taken for it;
+/// the first frame where there is only one or where nearly everything is constant. `next` is the
+/// correlation of successive frames.
 pub fn moving(frames: &[Vec<f32>], next: Option<f64>) -> Vec<f32> {
     match frames {
         [a, b, ..] if next.is_none_or(|c| c < STILL) => change(a, b),
@@ -23,7 +22,7 @@ pub fn moving(frames: &[Vec<f32>], next: Option<f64>) -> Vec<f32> {
     }
 }
 
-/// What changes between a view's frames, as orthogonal images that have one frame's variance each.
+/// Changes between a view's frames, as orthogonal images that each have the variance of one frame.
 pub fn changes(frames: &[Vec<f32>]) -> Vec<Vec<f32>> {
     match frames {
         [a, b, c, d, ..] => {
@@ -37,17 +36,17 @@ pub fn changes(frames: &[Vec<f32>]) -> Vec<Vec<f32>> {
     }
 }
 
-/// From one frame to another, with the variance of one.
+/// Change from one frame to another, scaled to the variance of one.
 fn change(a: &[f32], b: &[f32]) -> Vec<f32> {
     a.iter().zip(b).map(|(a, b)| (b - a) * FRAC_1_SQRT_2).collect()
 }
 
-/// Residuals as an image, px, without what is smooth and what is known.
+/// Residuals as an image, px, high-passed and without the known bias.
 pub fn high_passed(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     field.high_passed(&without_bias(residuals, bias))
 }
 
-/// Residuals less what is known of them, which may be nothing.
+/// Residuals without the known bias, which may be empty.
 pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
     if bias.is_empty() {
         return Cow::Borrowed(residuals);
@@ -55,13 +54,12 @@ pub fn without_bias<'a>(residuals: &'a [f32], bias: &[f32]) -> Cow<'a, [f32]> {
     residuals.iter().zip(bias).map(|(r, b)| r - b).collect()
 }
 
-/// Residuals as an image, px, without what is known, gross errors, and all that does not change from
-/// pixel to pixel.
+/// Residuals as an image, px, without the known bias, gross errors and the means over [`PIXEL_BOX`].
 pub fn pixel_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     high_pass(&fine_scale(field, residuals, bias), field.width, PIXEL_BOX)
 }
 
-/// The same, and beside it what does not change from pixel to pixel but is not smooth: its means over as many.
+/// Same, followed by those means: neither smooth nor changing from pixel to pixel.
 pub fn at_two_scales(field: &Field, residuals: &[f32], bias: &[f32]) -> [Vec<f32>; 2] {
     let image = fine_scale(field, residuals, bias);
     let pixels = high_pass(&image, field.width, PIXEL_BOX);
@@ -73,24 +71,24 @@ fn fine_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     without_outliers(&high_passed(field, residuals, bias))
 }
 
-/// Without gross errors.
+/// Replaces gross errors by NaN.
 pub fn without_outliers(image: &[f32]) -> Vec<f32> {
     let limit = gross_limit(image);
     let kept = |r: &f32| if r.abs() > limit { f32::NAN } else { *r };
     image.iter().map(kept).collect()
 }
 
-/// Rows and columns shorter than this are left as they are, px: their mean is mostly noise.
+/// Shorter rows and columns keep their mean, px: it is mostly noise.
 const LONG_LINE: f64 = 150.0;
-/// The same where a pixel is held against itself, and a line's mean only stands in the way.
+/// Same where a pixel is compared with itself and a line's mean only disturbs.
 pub const SHORT_LINE: f64 = 30.0;
 
-/// The row, or the column, of an image's pixel.
+/// Row, or column, of a pixel of an image.
 pub fn line_of(pixel: usize, width: usize, axis: Axis) -> usize {
     if axis == Axis::Row { pixel / width } else { pixel % width }
 }
 
-/// Of each row, or each column, the sum and the number of its pixels.
+/// Sum and number of the finite pixels of each row, or of each column.
 pub fn line_sums(image: &[f32], width: usize, axis: Axis) -> Vec<(f64, f64)> {
     let lines = if axis == Axis::Row { image.len() / width.max(1) } else { width };
     let mut sums = vec![(0.0, 0.0); lines];
@@ -102,7 +100,7 @@ pub fn line_sums(image: &[f32], width: usize, axis: Axis) -> Vec<(f64, f64)> {
     sums
 }
 
-/// Minus the mean of each long row and column: noise that a row shares is no window's.
+/// Subtracts the mean of each long row and column: noise common to a line is not a window's.
 pub fn without_lines(image: &[f32], width: usize, min_pixels: f64) -> Vec<f32> {
     let mut out = image.to_vec();
     let level = |(sum, n): (f64, f64)| if n >= min_pixels { (sum / n) as f32 } else { 0.0 };
@@ -114,12 +112,12 @@ pub fn without_lines(image: &[f32], width: usize, min_pixels: f64) -> Vec<f32> {
     out
 }
 
-/// Of the noise, what rows or columns share is taken out whole from here on: the mean of 30 pixels of a
-/// Kinect's window, 9 px, errs by three tenths of the rest, which is less.
+/// From this share of the variance on, the part common to rows or columns is subtracted whole. The mean of 30
+/// pixels of a Kinect's window, 9 px, adds three tenths of the remaining variance, which is less.
 const LARGE_SHARE: f64 = 0.25;
 
-/// Area of the window that the pixels of an image hang together by, px^2, where rows and columns have
-/// these `shares` of the variance: theirs stand in the correlation at every lag, and are no window's.
+/// Area of the window that correlates the pixels of an image, px^2. Rows and columns have these `shares` of
+/// the variance, which add to the correlation at every lag and are not a window's.
 pub fn area(noise: &[f32], width: usize, shares: [f64; 2]) -> f64 {
     let is_large = shares.iter().any(|share| *share > LARGE_SHARE);
     let (min_pixels, shares) = if is_large { (SHORT_LINE, [0.0; 2]) } else { (LONG_LINE, shares) };
@@ -146,15 +144,15 @@ pub fn same_pixel(a: &[f32], b: &[f32]) -> f64 {
     if aa * bb > 0.0 { ab / (aa * bb).sqrt() } else { f64::NAN }
 }
 
-/// A pixel's own error changes from pixel to pixel: the box whose mean is taken out, px.
+/// Side of the box whose mean is subtracted to leave errors that change from pixel to pixel, px.
 pub const PIXEL_BOX: usize = 7;
 
 /// Lags well beyond a Kinect's window, px.
 pub const FAR: [usize; 12] = [20, 22, 24, 27, 30, 33, 36, 39, 42, 46, 50, 54];
-/// Lags that a window's side is read from, px.
+/// Longest lag that a window's side is fitted to, px.
 pub const PROFILE_LAGS: usize = 16;
 
-/// An image with nothing where there is none: sums run over it without a question.
+/// An image with zeros where there is no value, so that sums need no test.
 pub struct Filled {
     value: Vec<f32>,
     there: Vec<u8>,
@@ -169,7 +167,7 @@ impl Filled {
     }
 }
 
-/// Mean product of pixels that are so far apart along `step`, px^2.
+/// Mean product of pixels at these lags along `step`, px^2; `None` with too few pairs.
 pub fn covariance(image: &Filled, width: usize, lags: &[usize], step: [usize; 2]) -> Option<f64> {
     let (w, h) = (width, image.value.len() / width.max(1));
     let (mut sum, mut n) = (0.0, 0u64);
@@ -202,9 +200,9 @@ fn products(a: &[f32], b: &[f32]) -> f64 {
     lanes.iter().sum::<f64>() + rest
 }
 
-/// Logarithm of each frame's mean square over the others', of rough residuals. What frames have in
-/// common, still or slowly changing, is in all of them alike. Nothing with fewer than three frames,
-/// of which none can be blamed. And how many pixels all of them measured, which are those looked at.
+/// Log ratio of each frame's mean square to the others', from high-passed residuals, and the number of pixels
+/// used: those measured in all frames. What frames share, constant or slowly changing, is the same in all.
+/// `None` with fewer than three frames, which cannot show which one differs.
 pub fn frame_log_variance(frames: &[Vec<f32>]) -> ([Option<f64>; FRAMES_KEPT], f64) {
     let (mut all, mut pixels) = ([None; FRAMES_KEPT], 0.0);
     let n = frames.len().min(FRAMES_KEPT);
@@ -236,8 +234,8 @@ mod tests {
     use crate::rng::Seed;
     use crate::stats::noise_through_boxes;
 
-    /// An image of noise by boxes of this side beside rows that err by about so much of the variance, and
-    /// their share as it turned out.
+    /// Noise through boxes of this side plus rows with about this share of the
+    /// variance, and their actual share.
     fn image(side: usize, share: f64) -> (Vec<f32>, f64) {
         let mut rng = Seed(7).stream("texture/area");
         let noise = noise_through_boxes([WIDTH, HEIGHT], side, &mut rng);

@@ -10,7 +10,7 @@ use crate::terms::{Axis, Statistic};
 /// A mismatch of the noise's structure.
 #[derive(Debug, Clone)]
 pub struct TextureFinding {
-    /// Best first; more than one when they cannot be told apart. Empty: no name.
+    /// Best first; several when they cannot be told apart. Empty: no name.
     pub families: Vec<&'static str>,
     pub statistic: Statistic,
     pub axis: Axis,
@@ -19,38 +19,38 @@ pub struct TextureFinding {
     /// In units of the noise's standard deviation.
     pub size_sigma: f64,
     pub p: f64,
-    /// Roughly, nats a recording.
+    /// Approximate evidence, nats per recording.
     pub nats: f64,
     pub words: Option<String>,
-    /// So many views have it, of so many, as the words tell; `None` of what all have.
+    /// Number of views that show it, and of views measured, as the words say; `None` if all do.
     pub of_some: Option<[usize; 2]>,
 }
 
 impl TextureFinding {
-    /// What these views showed when they were taken for all, of so many that were measured.
+    /// Marks what these views showed by themselves as a finding of some of the views measured.
     pub fn of_some(self, [shown, of]: [usize; 2], p: f64) -> Self {
         let which = in_some_views([shown, of]);
         let words = Some(self.words.map_or(which.clone(), |words| format!("{words}, {which}")));
         TextureFinding { words, of_some: Some([shown, of]), p, ..self }
     }
 
-    /// Tails too weak to count, which the fourth moment alone tells.
+    /// Whether these are tails too weak to count, shown by the fourth moment alone.
     pub fn are_weak_tails(&self) -> bool {
         self.parameters.contains_key(EXCESS)
     }
 
-    /// Of tails: do all views have errors far out?
+    /// For tails: whether all views have errors far out.
     pub fn are_far_errors(&self) -> bool {
         self.of_some.is_none() && !self.are_weak_tails()
     }
 
-    /// Columns or rows that stand still, without a name.
+    /// Whether these are constant errors of columns or rows, without a name.
     pub fn are_still_lines(&self) -> bool {
         let of_lines = matches!(self.axis, Axis::Column | Axis::Row);
         self.families.is_empty() && self.statistic == Statistic::Bias && of_lines
     }
 
-    /// With these names, and nothing else said yet.
+    /// A finding with these names and nothing else set.
     pub fn named(families: Vec<&'static str>, statistic: Statistic, axis: Axis) -> Self {
         TextureFinding {
             families,
@@ -67,23 +67,23 @@ impl TextureFinding {
     }
 }
 
-/// The parameter that tells tails too weak to count from far errors.
+/// Parameter that marks weak tails; far errors do not have it.
 pub const EXCESS: &str = "excess_kurtosis";
 
-/// Variance that pixels or lines share, as it is looked for.
+/// A test for variance that pixels or lines share.
 pub struct Shared {
     pub families: Vec<&'static str>,
     pub statistic: Statistic,
     pub axis: Axis,
-    /// What the model has of it, px^2.
+    /// Variance in the model, px^2.
     pub expected_px2: f64,
-    /// Of all variance: a smaller share is not worth a word.
+    /// Least share of the total variance worth reporting.
     pub min_share: f64,
     pub words: Option<&'static str>,
 }
 
 impl Shared {
-    /// `m` of the noise's `variance_px2`, both px^2.
+    /// Tests `m` against the model; `variance_px2` is that of the noise, both px^2.
     pub fn found(self, m: &ViewMean, variance_px2: f64, level: f64) -> Option<TextureFinding> {
         let p = m.p_above(self.expected_px2);
         let share = (m.value - self.expected_px2) / variance_px2.max(1e-12);

@@ -1,4 +1,4 @@
-//! The mean of a statistic over the views, which no single view moves far.
+//! Robust mean of a statistic over the views.
 
 use super::structure::Structure;
 use crate::diagnose::search::null::student;
@@ -13,7 +13,7 @@ pub struct ViewMean {
 }
 
 impl ViewMean {
-    /// Of a statistic that some of the views have.
+    /// Mean of a statistic over the views that have it.
     pub fn of(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Self> {
         let values: Vec<(f64, f64)> = views
             .iter()
@@ -22,8 +22,8 @@ impl ViewMean {
         ViewMean::weighed(&values)
     }
 
-    /// Of the variance that rows share (columns: 1), px^2: a view counts by what it errs by, as the pairs in a line grow
-    /// with its length squared.
+    /// Mean of the variance common to rows (columns: 1), px^2. Views are weighted by their standard error, as
+    /// the number of pairs in a line grows with its length squared.
     pub fn of_lines(views: &[Structure], axis: usize) -> Option<Self> {
         let variance = variance_px2(views);
         let of = |s: &Structure| {
@@ -33,8 +33,8 @@ impl ViewMean {
         ViewMean::weighed(&views.iter().filter_map(of).collect::<Vec<_>>())
     }
 
-    /// Of what each view shares with all the others: a pair of views counts in two of the values, so
-    /// that these scatter less than their mean errs.
+    /// Mean of what each view shares with all the others. A pair of views counts in two of the values, so
+    /// their scatter understates the error of the mean.
     pub fn of_pairs(
         views: &[Structure],
         value: impl Fn(&Structure) -> Option<f64>,
@@ -44,7 +44,7 @@ impl ViewMean {
         (m.views > 2.0).then_some(ViewMean { std_error, ..m })
     }
 
-    /// Of values, each with how much there is of what it was measured on.
+    /// Mean of values, each with the size of what it was measured on.
     pub fn weighed(values: &[(f64, f64)]) -> Option<Self> {
         let weighted = Weight::of(values).each(values);
         if weighted.len() < 2 {
@@ -54,7 +54,8 @@ impl ViewMean {
         Some(ViewMean { value, std_error, views: weighted.len() as f64 })
     }
 
-    /// Of how many pixels a mean over the views is, each of so many that lie within those of all that have more.
+    /// Effective number of pixels of a mean over the views, if a view's pixels lie within
+    /// those of all larger ones.
     pub fn common_size(views: &[Structure], pixels: impl Fn(&Structure) -> f64) -> f64 {
         let values: Vec<(f64, f64)> = views.iter().map(|s| (pixels(s), s.pixels)).collect();
         let weighted = Weight::of(&values).each(&values);
@@ -65,8 +66,8 @@ impl ViewMean {
         total * total / shared.sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
-    /// Nats by which the `value` of one more view, of this size, is likelier about the mean of these values than
-    /// about none: by Student's t of their scatter.
+    /// Gain in log-likelihood, nats, of one more view's `value` from the mean of these values rather than
+    /// zero, by Student's t of their scatter.
     pub fn predicts(values: &[(f64, f64)], (value, size): (f64, f64)) -> Option<f64> {
         let m = ViewMean::weighed(values)?;
         let weight = Weight::of(values);
@@ -80,24 +81,24 @@ impl ViewMean {
         nats.is_finite().then_some(nats)
     }
 
-    /// The same that errs by so much in all views alike, too.
+    /// Adds a standard error common to all views.
     pub fn and_error(self, common: f64) -> Self {
         ViewMean { std_error: self.std_error.hypot(common), ..self }
     }
 
-    /// Chance of a mean this far above `expected`, one-sided, by Student's t.
+    /// One-sided p-value of a mean this far above `expected`, by Student's t.
     pub fn p_above(&self, expected: f64) -> f64 {
         let t = (self.value - expected) / self.std_error.max(1e-12 * self.value.abs()).max(1e-300);
         student_upper(t, self.views - 1.0).max(1e-300)
     }
 
-    /// The same below it.
+    /// Same below `expected`.
     pub fn p_below(&self, expected: f64) -> f64 {
         ViewMean { value: -self.value, ..*self }.p_above(-expected)
     }
 }
 
-/// What values count by the sizes of what they were measured on.
+/// Weights of values by the sizes of what they were measured on.
 pub struct Weight {
     sized: bool,
     middle: f64,
@@ -110,44 +111,45 @@ impl Weight {
         Weight { sized: middle.is_some(), middle: middle.unwrap_or(0.0) }
     }
 
-    /// A small one says little; views differ for reasons of their own, so that a large one does not say all.
+    /// Weight for this size. Small views say little; large ones level off, as views
+    /// differ for other reasons too.
     pub fn at(&self, size: f64) -> f64 {
         if self.sized { size / (size + ERROR_OVER_OWN * self.middle) } else { 1.0 }
     }
 
-    /// The values with their weights. Of nothing there is nothing to tell.
+    /// The values with their weights, without those of size zero.
     fn each(&self, values: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let used = values.iter().filter(|v| v.1 > 0.0 || !self.sized);
         used.map(|v| (v.0, self.at(v.1))).collect()
     }
 }
 
-/// What a view of middling size errs by over what views differ by for reasons of their own, in squares. Of
-/// clean sessions 5 to 12 in 10,000 are then beyond a level of 9 in 10,000, whatever views differ by up to
-/// a middling one's error (simulated, 11 to 20 views of 1,000 to 19,000 pixels).
+/// Squared error of a view of mean size over the squared scatter of the views for other reasons. Of clean
+/// sessions 5 to 12 in 10,000 are then beyond a level of 9 in 10,000, for a scatter of up to a mean view's
+/// error (simulated, 11 to 20 views of 1,000 to 19,000 pixels).
 const ERROR_OVER_OWN: f64 = 2.0;
-/// Fewer views do not tell which of them strays.
+/// Fewest views that show which of them is an outlier.
 const MIN_FOR_STRAYS: usize = 8;
-/// Standard deviations from where on a view strays: of Gaussian ones one in 80 does, which costs 0.2 % of
-/// the information (Huber, Robust Statistics, 1981).
+/// Outlier threshold, in standard deviations. One in 80 Gaussian views is beyond, which costs 0.2 % of the
+/// information (Huber, Robust Statistics, 1981).
 const STRAY: f64 = 2.5;
 
-/// Where distances from the middle, each over what its view errs by, are a stray's; nowhere if most of them
-/// are none at all, as counts of what is rare are.
+/// Outlier threshold of the weighted distances from the mean. Infinite if most of them are zero, as
+/// for counts of rare events.
 fn stray_beyond(distances: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = distances.collect();
     let stray = STRAY * MAD_TO_SIGMA * median(&mut all);
     if all.len() < MIN_FOR_STRAYS || stray == 0.0 { f64::INFINITY } else { stray }
 }
 
-/// What is left of a view's weight at this distance: a stray moves no mean farther than one that lies where
-/// strays begin.
+/// Factor on a view's weight at this distance: an outlier moves the mean no farther than
+/// a view at the threshold.
 fn held(distance: f64, stray: f64) -> f64 {
     if distance > stray { stray / distance } else { 1.0 }
 }
 
-/// Huber's mean of values with their weights, begun at the median, and its standard error by least squares
-/// with the influence of every value on it.
+/// Huber's mean of weighted values, started at the median, and its least-squares standard error with every
+/// value's influence limited.
 fn huber(values: &[(f64, f64)]) -> (f64, f64) {
     const ROUNDS: usize = 20;
     let off = |mean: f64| values.iter().map(move |(x, w)| w.sqrt() * (x - mean).abs());
@@ -173,13 +175,13 @@ fn huber(values: &[(f64, f64)]) -> (f64, f64) {
     (mean, (squares / free * total).sqrt() / trusted)
 }
 
-/// What a mean off `expected` is worth.
+/// Evidence, in nats, for a mean that differs from `expected`.
 pub fn nats(m: &ViewMean, expected: f64) -> f64 {
     let t = (m.value - expected) / m.std_error.max(1e-9);
     student(0.5 * t * t, m.views)
 }
 
-/// Of the first frame's rough residual, px^2.
+/// Mean variance of the first frames' high-passed residuals, px^2.
 pub fn variance_px2(views: &[Structure]) -> f64 {
     ViewMean::of(views, |s| Some(s.variance_px2)).map_or(0.0, |m| m.value)
 }
@@ -192,7 +194,7 @@ mod tests {
     use super::*;
     use crate::rng::{Seed, Stream};
 
-    /// Values of so many views about `mean`, each off by its own noise: 0.2 over the root of its size.
+    /// `n` views about `mean`, each with its own noise: 0.2 over the root of its size.
     fn views(mean: f64, n: usize, rng: &mut Stream) -> Vec<(f64, f64)> {
         let view = |_| {
             let (size, normal): (f64, f64) =
@@ -209,16 +211,15 @@ mod tests {
             let p = |_| ViewMean::weighed(&views(0.0, n, &mut rng)).unwrap().p_above(0.0);
             (0..4000).map(p).filter(|p| *p < 0.01).count()
         };
-        // Binomial of 4000 at .01: 40, give or take 6.3; that views have no more than their noise's
-        // scatter makes it fewer.
+        // Binomial: 40 of 4000 +- 6.3; views that scatter only by their noise make it fewer.
         for n in [5, 10, 20] {
             let above = above(n);
             assert!((10..=59).contains(&above), "{above} of 4000 with {n} views");
         }
     }
 
-    /// Of a hundred further views: by as much as Gaussian ones with these errors bring, and by nothing where there
-    /// is nothing to learn.
+    /// A hundred further views gain what Gaussian ones with these errors would, and nothing where
+    /// there is nothing to learn.
     #[test]
     fn further_views_are_predicted_by_what_was_learnt() {
         let mut rng = Seed(7).stream("view-mean/predicts");
@@ -229,16 +230,16 @@ mod tests {
                 further.map(|v| ViewMean::predicts(&learnt_on, v).unwrap()).collect();
             nats.iter().sum::<f64>() / 100.0
         };
-        // 0.5 (mean / error)^2 on average: 0.5 * 0.005^2 * 1.05e4 / 0.2^2 = 3.3 nats each, and of a hundred the
-        // root of 2 * 3.3 / 100 = 0.26 more or less. That large views count by less than their size costs a part.
+        // On average 0.5 (mean / error)^2: 0.5 * 0.005^2 * 1.05e4 / 0.2^2 = 3.3 nats each, +-
+        // sqrt(2 * 3.3 / 100) = 0.26 for a hundred. Less a part, as large views weigh less than their size.
         let nats = brought(0.005);
         assert!((1.5..3.6).contains(&nats), "{nats}");
-        // Of nothing the learnt mean's own error costs half of one in sixty.
+        // With a mean of zero, the error of the learnt mean costs 0.5 / 60 nats.
         let nats = brought(0.0);
         assert!(nats.abs() < 0.05, "{nats}");
     }
 
-    /// Views without a pixel, more than there are others, take no part.
+    /// Views without a pixel take no part, though more than the others.
     #[test]
     fn views_of_no_size_say_nothing() {
         let mut rng = Seed(6).stream("view-mean/none");
@@ -251,7 +252,7 @@ mod tests {
         assert!(ViewMean::weighed(&[(1.0, 5.0), (2.0, 0.0)]).is_none());
     }
 
-    /// One view with a still error of its own does not hide what the others share, and is no finding alone.
+    /// One view with a constant error of its own neither hides what the others share nor is a finding alone.
     #[test]
     fn a_view_that_strays_moves_the_mean_by_little() {
         let mut rng = Seed(5).stream("view-mean/stray");

@@ -1,4 +1,4 @@
-//! The window that a part of the noise comes through, from how correlation falls with distance.
+//! Window that part of the noise passes through, from the decay of the correlation with distance.
 
 use super::structure::Structure;
 use super::texture::{FAR, PROFILE_LAGS};
@@ -7,29 +7,29 @@ use crate::diagnose::search::posterior::Posterior;
 use crate::diagnose::views::box_sums::SMOOTH_PX;
 use crate::stats::even;
 
-/// Its side, px, and the share of the variance that comes through it, each with its standard error.
+/// Side, px, and share of the variance that passes through it, each with its standard error.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
     pub length: [f64; 2],
     pub share: [f64; 2],
 }
 
-/// Correlation of pixels `lag` apart under a window of unit side: all alike, a tent or a bell of the
-/// same reach. Over all lags each sums to one.
+/// Correlation at `lag` under a window of unit side: flat, tent or bell, of the same extent. Each
+/// sums to one over all lags.
 const FORMS: [fn(f64) -> f64; 3] =
     [|lag| (1.0 - lag).max(0.0), tent, |lag| (-std::f64::consts::PI * lag * lag).exp()];
 
-/// A tent's half foot is two thirds of the side.
+/// Half the base of a tent is two thirds of the side.
 fn tent(lag: f64) -> f64 {
     let x = 1.5 * lag;
     if x <= 1.0 { 1.0 - 1.5 * x * x + 0.75 * x.powi(3) } else { 0.25 * (2.0 - x).max(0.0).powi(3) }
 }
 
-/// Sides that are tried, px, evenly in the logarithm.
+/// Sides tried, px, evenly spaced in the logarithm.
 const SIDES: usize = 400;
 const REACH_PX: [f64; 2] = [1.2, 64.0];
 
-/// By the views' mean course; its lags err alike, since it is the same noise that they are made of.
+/// Fits the views' mean profile. All lags have the same error, since they come from the same noise.
 pub fn part(views: &[Structure]) -> Option<Window> {
     let lag = |k: usize| ViewMean::of(views, |s| Some(s.correlation_profile?[k]));
     let correlation_profile: Vec<ViewMean> = (0..PROFILE_LAGS).map(lag).collect::<Option<_>>()?;
@@ -39,8 +39,8 @@ pub fn part(views: &[Structure]) -> Option<Window> {
     of(&values, variance)
 }
 
-/// The course of noise whose correlation along either axis is `of` the lag, as it is measured: what is
-/// smooth was taken out, and what far pixels along the diagonal share.
+/// Measured profile of noise whose correlation along either axis is `of` the lag: after the high-pass, and
+/// less the correlation of far pixels along the diagonal.
 fn seen(of: &dyn Fn(f64) -> f64, lags: usize) -> Vec<f64> {
     let reach = FAR[FAR.len() - 1];
     let half = SMOOTH_PX / 2;
@@ -75,7 +75,7 @@ fn of(correlation_profile: &[f64], variance: f64) -> Option<Window> {
                 (beyond(&through), beyond(correlation_profile));
             let information = dot(&shape, &shape) / variance;
             let share = dot(&shape, &left) / variance / information;
-            // No more than all comes through; a window that no lag lies in shows nothing.
+            // At most all of the noise passes through; a window without a lag inside shows nothing.
             if information > 0.0 && (0.0..=1.0).contains(&share) {
                 let evidence = 0.5 * (share * share * information - information.ln());
                 nodes.push([evidence, side, share, 1.0 / information]);
@@ -97,8 +97,8 @@ mod tests {
     use super::*;
     use crate::rng::Seed;
 
-    /// Courses of each form with lags that err alike: 90 % of 60 are 54; 48 or fewer have a chance
-    /// of 2 %.
+    /// Profiles of each form with equal errors at all lags: 90 % of 60 are 54; 48 or
+    /// fewer have a chance of 2 %.
     #[test]
     fn intervals_hold_the_side_and_the_share() {
         const ERROR: f64 = 4e-4;

@@ -1,4 +1,4 @@
-//! What may shift the mean: candidates in px of disparity.
+//! Candidates for the bias, px of disparity.
 
 use super::candidate::Candidate;
 use crate::camera::Camera;
@@ -6,7 +6,7 @@ use crate::effects::Bounds;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Extent, Modulation, Statistic};
 
-/// The catalogue's biases and the curves without a name.
+/// Biases of the catalogue and nameless curves.
 pub fn candidates(bounds: &Bounds) -> Vec<Candidate> {
     let mut all = Candidate::of_catalogue(Statistic::Bias, bounds);
     all.extend(curves(bounds.camera, bounds.reach));
@@ -15,7 +15,7 @@ pub fn candidates(bounds: &Bounds) -> Vec<Candidate> {
     all
 }
 
-/// Curves without a name, one axis each, and maps over two.
+/// Nameless curves over one axis, and maps over two.
 fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let curve = |over, [low, high]: [f64; 2], nodes, times| {
@@ -54,13 +54,13 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     all
 }
 
-/// Two halves of the picture that disagree, at any of these places.
+/// Steps between two parts of the image, at evenly spaced places.
 fn seams(length: f64, over: Coordinate) -> impl Iterator<Item = Candidate> {
     const PLACES: usize = 32;
     (2..PLACES - 1).map(move |k| Candidate::step(over, length * k as f64 / PLACES as f64, 2.0))
 }
 
-/// What turns with the direction of the tilt and is not there without one.
+/// A curve along the direction of the tilt that vanishes without tilt.
 fn along(camera: &Camera) -> Candidate {
     let (x, y) = camera.ray(0.0, 0.0);
     let most = x.hypot(y);
@@ -68,7 +68,7 @@ fn along(camera: &Camera) -> Candidate {
     Candidate::curve(Basis::Curve { over, low: -most, high: most, nodes: 9, times })
 }
 
-/// Periodic in depth: what a time-of-flight camera's harmonics do.
+/// Periodic curves in depth, as from the harmonics of a time-of-flight camera.
 fn waves(reach: &Extent) -> impl Iterator<Item = Candidate> {
     let span = reach.z[1] - reach.z[0];
     (3..=16).map(move |cycles| {

@@ -1,19 +1,19 @@
-//! What could be missing: a shape with, or without, the name of its cause.
+//! Candidates for a missing term: a shape with or without the name of its cause.
 
 use crate::effects::{self, Bounds, Effect, Flat, USUAL_PX};
 use crate::terms::{Axis, Basis, Coordinate, Modulation, Statistic};
 
-/// A term that is tried.
+/// A term to try.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// Id in the catalogue; `None` for a curve without a name.
     pub family: Option<&'static str>,
     pub basis: Basis,
-    /// What is stated of the target.
+    /// Stated flatness of the target.
     pub flat: Option<Flat>,
 }
 
-/// The sigma model's own parameters: nothing is missing, they are off.
+/// Family of the sigma model's own parameters: nothing is missing, they are off.
 pub const RECALIBRATE: &str = "recalibrate";
 
 impl Candidate {
@@ -25,13 +25,13 @@ impl Candidate {
         Candidate { family: None, basis, flat: None }
     }
 
-    /// One level up to `at` and another from there on, the rise between them `wide`.
+    /// A step at `at` from one level to another, rising over a width of `wide`.
     pub fn step(over: Coordinate, at: f64, wide: f64) -> Self {
         let (low, high) = (at - 0.5 * wide, at + 0.5 * wide);
         Candidate::curve(Basis::Curve { over, low, high, nodes: 2, times: Modulation::One })
     }
 
-    /// All that the catalogue's effects may look like.
+    /// All shapes of the catalogue's effects that change `statistic` and apply to this kind of sensor.
     pub fn of_catalogue(statistic: Statistic, bounds: &Bounds) -> Vec<Self> {
         let of = |effect: &'static dyn Effect| {
             let id = effect.card().id;
@@ -42,7 +42,7 @@ impl Candidate {
         effects::that_change(statistic).into_iter().filter(can).flat_map(of).collect()
     }
 
-    /// Does it follow the disparity itself? There is none in a time-of-flight camera.
+    /// Whether it follows the disparity itself, which a time-of-flight camera does not have.
     pub fn is_of_disparity(&self) -> bool {
         let over = |over: Coordinate| over == Coordinate::Disparity;
         match self.basis {
@@ -51,12 +51,12 @@ impl Candidate {
         }
     }
 
-    /// The cause that it is the shape of.
+    /// The effect that it is the shape of.
     pub fn effect(&self) -> Option<&'static dyn Effect> {
         effects::find(self.family?)
     }
 
-    /// The share that the cause's formula is off by; a curve without a name is what was measured.
+    /// Relative error of the effect's formula; 0 for a nameless curve, which is as measured.
     pub fn formula_error(&self) -> f64 {
         self.effect().map_or(0.0, |e| e.card().formula_error)
     }
@@ -66,7 +66,7 @@ impl Candidate {
         self.effect().map_or(USUAL_PX, |e| e.usual(&self.basis, k, self.flat.as_ref()))
     }
 
-    /// Does a fit of it agree with what its cause can do, and with what is stated of the target?
+    /// Whether a fit agrees with what its effect can do and with the stated flatness of the target.
     pub fn agrees(&self, coefficients: &[f64]) -> bool {
         let agrees = |e: &dyn Effect| e.agrees_with(self.flat.as_ref(), &self.basis, coefficients);
         self.effect().is_none_or(agrees)

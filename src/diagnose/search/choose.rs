@@ -1,4 +1,4 @@
-//! Which candidate a step takes: the name that explains as much as any, or the best curve.
+//! Selects the candidate of a step: a name that explains as much as any, or the best curve.
 
 use super::candidate::{Candidate, RECALIBRATE};
 use super::judge::Judged;
@@ -8,26 +8,28 @@ use super::rules::Rules;
 use crate::diagnose::finding::naming::{ln_occam, ln_odds};
 use crate::terms::Basis;
 
-/// Of families that predict as well as the best, the one with the fewest columns is meant.
+/// Families within this gain of the best predict as well as it, nats; of these the one with the fewest
+/// columns is taken.
 const AS_GOOD_NATS: f64 = 2.0;
-/// So they do within this share of a large gain: no family's shape is exact.
+/// The same as a share of a large gain: no family's shape is exact.
 const AS_GOOD_SHARE: f64 = 0.01;
-/// A formula of the catalogue that is off by more is another formula.
+/// Cap on a formula's relative error; one that is off by more is another formula.
 const FORMULA_ERROR: f64 = 0.1;
 
-/// How far behind the best a family predicts as well as it, nats.
+/// Largest gap to the best gain, nats, at which a family predicts as well.
 pub fn as_good(best: f64) -> f64 {
     AS_GOOD_NATS.max(AS_GOOD_SHARE * best)
 }
 
-/// A candidate whose fits to single views disagree is the worse one, where they do by more than twice
-/// what chance scatters a mean square of so many numbers by: once is off the dispersion already.
+/// Gain over the root of the dispersion, so that a candidate whose fits to single views disagree ranks
+/// lower. Two standard errors of a mean square of so many numbers are allowed for: one here, and one
+/// already subtracted from `dispersion`.
 pub fn corrected(gain: f64, dispersion: f64, numbers: usize) -> f64 {
     let clear = (dispersion - f64::sqrt(2.0 / numbers as f64)).max(1.0);
     if gain > 0.0 { gain / clear.sqrt() } else { gain }
 }
 
-/// The candidates of a step, and what each comes to.
+/// The candidates of a step and their assessments.
 pub struct Choice<'a> {
     pub candidates: &'a [Candidate],
     pub judged: &'a [Option<Judged>],
@@ -36,7 +38,8 @@ pub struct Choice<'a> {
 }
 
 impl Choice<'_> {
-    /// The best, if it brings more than noise can and is not among the `chosen` already.
+    /// Returns the best candidate, if its gain exceeds the noise threshold and it is not among the
+    /// `chosen` already.
     pub fn best(&self, chosen: &[Chosen]) -> Option<Chosen> {
         let families = self.ranked(true, |i| self.dispersion_corrected_gain(i));
         let curves = self.ranked(false, |i| self.total(i));
@@ -52,7 +55,7 @@ impl Choice<'_> {
             let mut clear =
                 ranked.iter().copied().filter(|&i| self.calibrated_gain(i) > threshold && new(i));
             let best = clear.next()?;
-            // What is left of a map beside a curve over one coordinate is looked for next.
+            // A curve over one coordinate goes first; the rest of the map is looked for next.
             let is_map = |i: usize| matches!(self.candidates[i].basis, Basis::Map { .. });
             let as_much = |i: usize| self.total(i) > CLEAR * self.total(best);
             let is_curve = |i: usize| {
@@ -89,8 +92,8 @@ impl Choice<'_> {
         })
     }
 
-    /// Does it explain as much as the best, where views differ from it by what its formula leaves out
-    /// at second order rather than by their noise? That they scatter says nothing against it then.
+    /// Whether it explains as much as the best, and the views differ from it by second-order errors of
+    /// its formula rather than by noise. Their dispersion then does not count against it.
     fn is_as_exact_as_a_formula(&self, i: usize, most: f64) -> bool {
         let (total, candidate) = (self.total(i), &self.candidates[i]);
         let Some(judged) = &self.judged[i] else { return false };
@@ -116,7 +119,7 @@ impl Choice<'_> {
         curves.first().map_or(f64::NEG_INFINITY, |&i| self.total(i))
     }
 
-    /// The name to take, if any: of those as good as the best the one with the fewest columns.
+    /// Name to take, if any: of those as good as the best, the one with the fewest columns.
     fn name(&self, families: &[usize], curves: &[usize]) -> Option<usize> {
         let threshold = self.noise.threshold(self.rules.level);
         let best_curve = self.best_curve(curves);
@@ -141,11 +144,11 @@ impl Choice<'_> {
                 let own = curves.iter().copied().find(|&k| axis(k) == axis(i));
                 let least =
                     own.map_or(0.0, |k| self.rules.own_axis_adequacy * self.total(k).max(0.0));
-                // A name with a lower share of its own may ride on another cause's error.
+                // A name with a lower adequacy of its own may ride on another cause's error.
                 let alone = self.adequacy(i) >= self.rules.adequacy;
                 !alone || self.total(i) > least
             })
-            // What fewer columns without a name do better is not what the name says.
+            // A nameless curve with fewer columns and a larger gain speaks against the name.
             .filter(|&i| {
                 let simpler = |&k: &usize| columns(k) < columns(i) && self.total(k) > self.total(i);
                 !curves.iter().any(simpler)
@@ -157,8 +160,8 @@ impl Choice<'_> {
             })
     }
 
-    /// The best of every family: of the winner's the shape that brings most, of another's the one
-    /// that is most probable with its columns.
+    /// The best of each family: for the winner's the shape with the largest gain, for the others the
+    /// most probable one given its number of columns.
     fn rivals(&self, winner: usize, families: &[usize]) -> Option<Vec<Rival>> {
         let won = &self.judged[winner].as_ref()?.gain;
         let own = self.candidates[winner].family;
@@ -187,14 +190,14 @@ impl Choice<'_> {
         Some(rivals)
     }
 
-    /// Light of the room was measured for its own sake; the surface's is made out of an image that
-    /// the room lights too.
+    /// Whether its axis was measured for its own sake, as ambient light is; the light of the surface
+    /// comes from an image that ambient light brightens too.
     fn rests_on_a_measurement(&self, i: usize) -> bool {
         self.candidates[i].effect().is_some_and(|e| e.rests_on_a_measurement())
     }
 
-    /// The share of the best curve that a name must explain. The law of sigma has columns for
-    /// nearly everything that happens to go with the distance.
+    /// Share of the best curve's gain that a name must reach. It is higher for the sigma model, whose
+    /// columns fit nearly anything that varies with distance.
     fn adequacy(&self, i: usize) -> f64 {
         let candidate = &self.candidates[i];
         if candidate.family == Some(RECALIBRATE) {
@@ -205,10 +208,10 @@ impl Choice<'_> {
     }
 }
 
-/// A nameless curve that is in already, perhaps with other nodes.
+/// Whether both are the same nameless curve, perhaps with other nodes.
 fn same_curve(a: &Candidate, b: &Candidate) -> bool {
     let key = |c: &Candidate| match c.basis {
-        // A step and a smooth curve are not one.
+        // A step and a smooth curve are not the same.
         Basis::Curve { over, times, nodes, .. } => Some((format!("{over:?}{}", nodes == 2), times)),
         Basis::Map { times, .. } => Some(("map".to_string(), times)),
         _ => None,
@@ -219,12 +222,12 @@ fn same_curve(a: &Candidate, b: &Candidate) -> bool {
 
 /// See [`Choice::adequacy`].
 const LAW_ADEQUATE: f64 = 0.85;
-/// A name that explains this share of what the best nameless curve does is met by its own shape; and a curve of
-/// a map.
+/// A name with this share of the best nameless curve's gain needs no agreement between views; a curve
+/// with this share of a map's gain is preferred to it.
 const CLEAR: f64 = 0.85;
 
-/// Views that scatter about a common fit far beyond their noise are explained badly; a name must
-/// then help most of them.
+/// Whether the views agree on a name: where they scatter about the common fit far beyond their noise,
+/// it must help most of them.
 fn consistent_across_views(judged: &Judged) -> bool {
     const WILD: f64 = 3.0;
     const STEADY: f64 = 2.5;
@@ -232,7 +235,7 @@ fn consistent_across_views(judged: &Judged) -> bool {
     judged.null.dispersion < WILD || behind(&judged.gain.by_view, &none) > STEADY
 }
 
-/// Mean difference over the views by its standard error.
+/// Mean difference over the views, divided by its standard error.
 pub fn behind(winner: &[f64], rival: &[f64]) -> f64 {
     let n = winner.len() as f64;
     let differences = || winner.iter().zip(rival).map(|(w, r)| w - r);
@@ -249,8 +252,8 @@ mod tests {
     use crate::rng::Seed;
     use crate::terms::{Axis, Basis, Coordinate, Modulation, PixelContext};
 
-    /// A ramp down the rows with a little over the columns is a ramp, and the little comes next; what
-    /// depends on both as much is a map.
+    /// A ramp over the rows with a small part over the columns is a row curve first; what depends
+    /// equally on both is a map.
     #[test]
     fn a_map_is_for_what_depends_on_both() {
         type Bias = fn(&PixelContext) -> f64;

@@ -1,4 +1,4 @@
-//! The views one by one, as candidates are tried on them that a part of the views may have alone.
+//! Evidence of single views, for candidates that only some of the views may show.
 
 use rayon::prelude::*;
 
@@ -11,13 +11,13 @@ use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
 use crate::diagnose::views::tiles::SIDE;
 use crate::terms::{Basis, PixelContext, Statistic, Term};
 
-/// What lies behind a target may be taken for its rim so far from the edge, px, and no other view
-/// outvotes it.
+/// Distance from the edge, px, within which background may be taken for the target's rim; in a single
+/// view no other outvotes it.
 const RIM_PX: f64 = SIDE as f64;
-/// A share of the weight that keeps a sample, and lets it say nothing.
+/// Factor on a weight that keeps a sample but makes it negligible.
 const NEXT_TO_NONE: f64 = 1e-9;
 
-/// A layer's views without what all of them share.
+/// A layer's views with the terms that all of them share subtracted.
 pub struct EachView {
     fine: Vec<ViewData>,
     coarse: Vec<ViewData>,
@@ -25,17 +25,17 @@ pub struct EachView {
     doubted: Vec<f64>,
 }
 
-/// The same, ready for the candidates.
+/// The same views, prepared for the candidates.
 pub struct Views<'a> {
     of: &'a EachView,
-    /// `None` where a view says nothing.
+    /// `None` for a view without information.
     prepared: Vec<Option<Prepared<'a>>>,
     prior: f64,
 }
 
 impl EachView {
-    /// `excess` is how many times less sure each view is than its samples say, where lines or views
-    /// err alike.
+    /// `excess` is the factor by which each view's variance exceeds what its samples imply, where lines
+    /// or views err alike.
     pub fn of(scene: &Scene<'_>, fine: &[ViewData], shared: &[Term], excess: &[f64]) -> Self {
         let of_mean = scene.statistic == Statistic::Bias;
         let doubted = if of_mean { doubted(scene.survey) } else { vec![1.0; fine.len()] };
@@ -73,7 +73,7 @@ impl EachView {
 }
 
 impl Views<'_> {
-    /// View by view; where a view's worth is doubted, it is worth the less the more these columns leave.
+    /// Evidence of each view; a doubted view counts for less the more these columns leave.
     pub fn evidence(&self, basis: &Basis) -> Option<Vec<Evidence>> {
         let nothing = || Evidence::zeros(basis.count());
         let of = |p: &Option<Prepared<'_>>| p.as_ref().map_or_else(nothing, |p| p.evidence(basis));
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
     use crate::terms::{Coordinate, Modulation};
 
-    /// A view without a reading takes no part, and keeps no other from it.
+    /// A view without data takes no part and does not affect the others.
     #[test]
     fn a_view_that_says_nothing_leaves_the_others_alone() {
         let place = |k: usize| PixelContext { u: k as f64, side: 4.0, ..Default::default() };

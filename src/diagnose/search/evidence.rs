@@ -20,17 +20,17 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// On `n` columns, before any view has said something.
+    /// Zero evidence on `n` columns.
     pub fn zeros(n: usize) -> Self {
         Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
     }
 
-    /// On a single column.
+    /// Evidence on a single column.
     pub fn of_one(a: f64, b: f64) -> Self {
         Evidence { a: DMatrix::from_element(1, 1, a), b: DVector::from_element(1, b) }
     }
 
-    /// On the first `n` columns alone.
+    /// Keeps the first `n` columns only.
     pub fn truncate(&mut self, n: usize) {
         if n < self.b.len() {
             self.a = self.a.view((0, 0), (n, n)).into_owned();
@@ -38,7 +38,7 @@ impl Evidence {
         }
     }
 
-    /// Of these views together, on `n` columns that are held by the precision `prior`.
+    /// Sum over these views, on `n` columns of prior precision `prior`.
     pub fn sum<E: Borrow<Self>>(n: usize, prior: f64, views: impl IntoIterator<Item = E>) -> Self {
         let held = Evidence { a: DMatrix::identity(n, n) * prior, b: DVector::zeros(n) };
         views.into_iter().fold(held, |mut sum, view| {
@@ -49,21 +49,21 @@ impl Evidence {
     }
 }
 
-/// What a set of terms brings on views they were not fitted to.
+/// Gain of a set of terms on views they were not fitted to.
 #[derive(Debug, Clone)]
 pub struct Gain {
     /// Nats, all views.
     pub total: f64,
     /// Nats, view by view.
     pub by_view: Vec<f64>,
-    /// Fit to all views.
+    /// Coefficients of the fit to all views.
     pub beta: DVector<f64>,
     /// Covariance of `beta`.
     pub covariance: DMatrix<f64>,
 }
 
 impl Gain {
-    /// Over what `base`, a part of the terms, brings on the same views.
+    /// Subtracts the gain that `base`, a subset of the terms, brings on the same views.
     pub fn over(mut self, base: &Gain) -> Self {
         self.total -= base.total;
         self.by_view.iter_mut().zip(&base.by_view).for_each(|(g, b)| *g -= b);
@@ -77,18 +77,18 @@ pub fn fit(views: &[Evidence], prior: f64) -> Option<DVector<f64>> {
     Some(Cholesky::of(a)?.solve(&b))
 }
 
-/// R with R Rᵀ = `a`: white noise through it is as a score of the information `a`.
+/// Square root R of `a`, R Rᵀ = `a`: R times white noise is distributed as a score of information `a`.
 pub fn root(a: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = a.clone().symmetric_eigen();
     let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
     &eigen.eigenvectors * DMatrix::from_diagonal(&roots)
 }
 
-/// Few unknowns are not worth more threads.
+/// Minimum views per parallel task; small systems are not worth more threads.
 const VIEWS_AT_ONCE: usize = 4;
 
-/// Gain over no term at all, each view predicted from a fit to the others. `prior` is the
-/// precision that holds a coefficient nothing is known about.
+/// Gain over no term at all, each view predicted from a fit to the others. `prior` is the prior
+/// precision of a coefficient.
 pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
     let Evidence { a, b } = Evidence::sum(views.first()?.b.len(), prior, views);
     let by_view: Vec<f64> = views
@@ -104,7 +104,7 @@ pub fn gain(views: &[Evidence], prior: f64) -> Option<Gain> {
     Some(Gain { total: by_view.iter().sum(), by_view, beta: whole.solve(&b), covariance })
 }
 
-/// Log likelihood of a view with the coefficients `beta` over that without any, nats.
+/// Log-likelihood of a view with the coefficients `beta` less that without any, nats.
 pub fn score(view: &Evidence, beta: &DVector<f64>) -> f64 {
     beta.dot(&view.b) - 0.5 * beta.dot(&(&view.a * beta))
 }

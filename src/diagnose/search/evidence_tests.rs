@@ -1,4 +1,4 @@
-//! Oracles of the evidence: dense least squares on all samples at once, and simulated noise.
+//! The evidence against dense least squares on all samples at once, and against simulated noise.
 
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
@@ -21,7 +21,7 @@ fn matrix(rows: usize, columns: usize, rng: &mut Stream) -> DMatrix<f64> {
 pub struct View {
     pub y: DVector<f64>,
     pub w: DVector<f64>,
-    /// Nuisances, and what holds each to zero.
+    /// Nuisances, and the prior precision of each.
     pub x: DMatrix<f64>,
     pub precision: Vec<f64>,
     /// Terms already chosen, and the candidate.
@@ -35,7 +35,7 @@ impl View {
     pub fn draw(n: usize, chosen: usize, candidate: usize, rng: &mut Stream) -> Self {
         View {
             y: DVector::from_fn(n, |_, _| normal(rng)),
-            // One in ten says nothing.
+            // One in ten has no weight.
             w: DVector::from_fn(n, |_, _| {
                 if rng.random::<f64>() < 0.1 { 0.0 } else { rng.random_range(0.1..5.0) }
             }),
@@ -66,7 +66,7 @@ impl View {
         join(&self.chosen, &self.candidate)
     }
 
-    /// log p of the view for given coefficients, its nuisances at their best, nats.
+    /// Profile log-likelihood of the view for given coefficients, nats.
     fn log_likelihood(&self, terms: &DMatrix<f64>, beta: &DVector<f64>) -> f64 {
         let left = &self.y - terms * beta;
         let w = DMatrix::from_diagonal(&self.w);
@@ -88,8 +88,7 @@ fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     all
 }
 
-/// Common coefficients of the terms by one dense system over all views, every view with its own
-/// nuisances.
+/// Common coefficients of the terms from one dense system over all views, each with its own nuisances.
 fn dense_fit(views: &[&View], terms: &dyn Fn(&View) -> DMatrix<f64>, prior: f64) -> DVector<f64> {
     let k = terms(views[0]).ncols();
     let width = k + NUISANCES * views.len();
@@ -111,7 +110,7 @@ fn dense_fit(views: &[&View], terms: &dyn Fn(&View) -> DMatrix<f64>, prior: f64)
     a.lu().solve(&b).expect("regular").rows(0, k).into_owned()
 }
 
-/// What the terms bring, each view left out in turn and predicted from the others.
+/// Gain of the terms, each view left out in turn and predicted from the others.
 fn dense_gain(views: &[View], terms: &dyn Fn(&View) -> DMatrix<f64>, prior: f64) -> Vec<f64> {
     (0..views.len())
         .map(|v| {

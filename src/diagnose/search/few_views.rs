@@ -1,8 +1,8 @@
-//! What shows in a few of the views and not in the others.
+//! Causes that show in a few of the views and not in the others.
 //!
-//! A fit to all views says nothing of a cause that some of them have: the others outvote it. So each
-//! candidate is also fitted to the views that show it best, one, two, up to nearly half of them, and pays
-//! for the choice: the logarithm of how many such sets there are.
+//! A fit to all views misses a cause that only some of them have: the others outvote it. So each
+//! candidate is also fitted to the views that show it best, one, two, up to nearly half of them. The
+//! choice costs the logarithm of the number of such sets.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
@@ -27,26 +27,26 @@ use crate::terms::{Basis, Term};
 
 /// Candidates with more columns fit single views too freely.
 const MAX_COLUMNS: usize = 16;
-/// Simulations of the null; its tail is an exponential's.
+/// Simulations of the null; its tail is taken as exponential.
 const REPLICATES: u64 = 200;
-/// What all views share explains at most so many times as much: what it misses in some views is its
-/// own shape, badly met.
+/// Largest ratio of the shared terms' gain to that of a cause in a few views; beyond it, the cause is a
+/// misfit of the shared terms' shape.
 const BESIDE_ALL: f64 = 10.0;
-/// A name must explain this share of what the best curve does: a few views show little of a shape.
+/// Share of the best gain that a name must reach; a few views show little of a shape.
 const NAME_ADEQUATE: f64 = 0.9;
-/// And so many times what a cause without a name explains in all views: a right one brought 4.6 times as much,
-/// wrong ones the same and less (three trials, three seeds of another hand).
+/// A name must also bring this multiple of a nameless cause's gain in all views: a right one brought
+/// 4.6 times as much, wrong ones the same and less (three trials, three seeds of another hand).
 const BESIDE_NAMELESS: f64 = 3.0;
 
-/// A candidate in the views that show it best.
+/// A candidate fitted to the views that show it best.
 struct Best {
-    /// Nats of a common fit to them, what the choice of them costs taken off.
+    /// Gain of a common fit to them, less the cost of choosing them and of the columns, nats.
     gain: f64,
     views: Vec<usize>,
     beta: DVector<f64>,
 }
 
-/// One candidate's information, view by view, less by how much more than noise its views scatter.
+/// One candidate's evidence, view by view, divided by the views' dispersion.
 struct Tried<'a> {
     candidate: &'a Candidate,
     evidence: Vec<Evidence>,
@@ -83,7 +83,7 @@ fn best(views: &[Evidence], prior: f64) -> Option<Best> {
 }
 
 impl<'a> Tried<'a> {
-    /// Held against a model that other views taught, all views may be off by `excess` in variance.
+    /// `excess` is the factor on all views' variance, where the model was learnt from other views.
     fn of(
         candidate: &'a Candidate,
         evidence: Vec<Evidence>,
@@ -95,13 +95,13 @@ impl<'a> Tried<'a> {
         for e in evidence.iter().filter(|e| e.a.trace() > 0.0) {
             squares.push(evidence::fit(std::slice::from_ref(e), prior)?.dot(&e.b));
         }
-        // A quarter of the views is as noise is, whatever nearly half of them have (the quartile of chi
-        // squared by Wilson and Hilferty 1931).
+        // The lowest quarter of the views is noise even if nearly half of them have the cause (quartile
+        // of chi squared by Wilson and Hilferty 1931).
         let (k, spread) = (k as f64, 2.0 / (9.0 * k as f64));
         let expected = k * (1.0 - spread - spread.sqrt() / MAD_TO_SIGMA).powi(3);
         let usual = quantile(&mut squares, 0.25).unwrap_or(0.0);
         let scatter = excess * (usual / expected).max(1.0);
-        // What the choice of the views costs is paid in full.
+        // Only the evidence is scaled: the cost of choosing the views is paid in full.
         let evidence: Vec<Evidence> =
             evidence.iter().map(|e| Evidence { a: &e.a / scatter, b: &e.b / scatter }).collect();
         let factors = evidence.iter().map(|e| root(&e.a)).collect();
@@ -112,7 +112,7 @@ impl<'a> Tried<'a> {
         best(&self.evidence, self.prior)
     }
 
-    /// Gain of nothing but noise.
+    /// Draws the gain of pure noise.
     fn draw(&self, rng: &mut Stream) -> f64 {
         let noise = |(e, root): (&Evidence, &DMatrix<f64>)| {
             let white = DVector::from_fn(root.ncols(), |_, _| StandardNormal.sample(rng));
@@ -123,8 +123,9 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// The strongest such cause beside what all views share, if noise does not bring as much; `excess` is how
-/// many times less sure each view is than its samples say, where lines or views err alike.
+/// Strongest cause of a few views beside the terms that all share, if its gain exceeds the noise
+/// threshold. `excess` is the factor by which each view's variance exceeds what its samples imply,
+/// where lines or views err alike.
 pub fn few_views(
     scene: &Scene<'_>,
     fine: &[ViewData],
@@ -150,7 +151,7 @@ pub fn few_views(
     all.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
     let most = all.first()?.1.gain;
     let shared: f64 = outcome.chosen.iter().map(|c| c.gain.max(0.0)).sum();
-    // Views beside those that a model was learnt from differ for reasons of their own.
+    // Views other than those a model was learnt from differ for reasons of their own.
     let beside_all = if rules.learnt_from.is_some() { 1.0 } else { BESIDE_ALL };
     if most * beside_all < shared {
         return None;
@@ -167,13 +168,13 @@ pub fn few_views(
     Some(report(scene, told, &names, noise.p(told.1.gain)))
 }
 
-/// Where more names than these explain it none is told.
+/// No name is reported if more than these explain it.
 const MAX_NAMES: usize = 3;
 
-/// Of the candidates, best first, the one to report, and the names it may have, none for a curve. In a few views
-/// much looks alike: a name must be better than what has none on another axis, and by far than what has none in all
-/// views, `nameless`: this one's misfit in some of them looks like anything. The level of one view's noise fits
-/// every cause that changes the noise.
+/// Returns the candidate to report, of all sorted best first, and the names it may have, none for a
+/// curve. Much looks alike in a few views, so a name must beat nameless curves on other axes. It must
+/// also clearly beat `nameless`, the gain of a nameless cause in all views, whose misfit in some of
+/// them may look like anything. The noise level of one view fits every cause that changes the noise.
 fn told<'a>(
     all: &'a [(&'a Candidate, Best)],
     nameless: f64,

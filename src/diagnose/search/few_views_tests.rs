@@ -1,4 +1,4 @@
-//! Causes of a few views, among views made by numbers.
+//! Causes of a few views, among simulated views.
 
 use super::*;
 use crate::terms::{Coordinate, Modulation};
@@ -14,7 +14,7 @@ fn views(name: &str, size: f64, of: usize) -> Vec<Evidence> {
     (0..18).map(one).collect()
 }
 
-/// Three views of eighteen show what is worth 150 nats in them: 0.5 a beta^2 each.
+/// Three views of eighteen show a cause, which is worth 150 nats in them: 0.5 a beta^2 each.
 #[test]
 fn the_views_that_show_it_are_found() {
     let mut found = best(&views("few-views/three", 1.0, 3), 0.1).unwrap();
@@ -23,8 +23,9 @@ fn the_views_that_show_it_are_found() {
     assert!((found.beta[0] - 1.0).abs() < 0.25 && found.gain > 90.0, "{}", found.gain);
 }
 
-/// Eight views of eighteen are few as well. Of the 390 nats no more than three quarters are lost: the
-/// quartile of all is the median of the ten that are noise, four times what it is taken for.
+/// Eight views of eighteen still count as few. At most three quarters of the 390 nats are lost: the
+/// lower quartile of all views is the median of the ten noise views, four times the quartile it is
+/// taken for.
 #[test]
 fn nearly_half_of_the_views_are_few() {
     let slope = Candidate::curve(Basis::powers(Coordinate::Column, 1, Modulation::One));
@@ -40,8 +41,8 @@ fn noise_brings_less_than_the_choice_costs() {
     assert!(above <= 6, "{above} of 200 above 5 nats");
 }
 
-/// Bands that a curve along the distance explains as well have no name; where only one along their own
-/// axis does they have.
+/// Bands that a curve over distance explains as well have no name; they keep it where only a curve over
+/// their own axis does.
 #[test]
 fn a_name_is_better_than_curves_on_other_axes() {
     let basis = |over| Basis::Ring { over, period: 1.0, nodes: 6, times: Modulation::One };
@@ -66,8 +67,8 @@ fn a_name_is_better_than_curves_on_other_axes() {
     assert_eq!(name_of(&all, 0.0), None, "a name that explains too little");
 }
 
-/// One view's level of noise: so many causes explain it that none is told, nor a curve that pays more for its
-/// columns than is left of it; two of them are.
+/// So many causes explain one view's noise level that none is named, and a curve whose columns cost
+/// most of its gain is not taken either; two causes are both named.
 #[test]
 fn what_many_causes_explain_has_no_name() {
     let level = |id| Candidate::named(id, Basis::Level);

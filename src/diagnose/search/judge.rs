@@ -1,4 +1,4 @@
-//! What a candidate comes to on its own: what it brings, how large it is, and whether it can be meant.
+//! Assessment of a single candidate: its gain, its size, and whether it is plausible.
 
 use super::candidate::Candidate;
 use super::evidence::Gain;
@@ -11,14 +11,14 @@ use crate::terms::Basis;
 pub struct Judged {
     pub gain: Gain,
     pub null: Null,
-    /// Can it be meant: of a sensible shape, and larger than what constant errors of the pixels
-    /// make by chance.
+    /// Large enough beside the largest term, and larger than what fixed errors of the pixels make by
+    /// chance.
     pub sensible: bool,
     pub rms: f64,
 }
 
 impl Judged {
-    /// Nats that count against what noise brings.
+    /// Gain calibrated for comparison with the null distribution, nats.
     pub fn calibrated_gain(&self, rules: &Rules) -> f64 {
         self.null.calibrated_gain(self.gain.total, self.gain.by_view.len(), rules)
     }

@@ -1,4 +1,4 @@
-//! The searches of the mean and of the size of the noise.
+//! Searches of the mean and of the size of the noise.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -21,21 +21,21 @@ use crate::model::SigmaModel;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
-/// No more terms than this are looked for in a layer.
+/// Maximum number of terms in a layer.
 const MAX_TERMS: usize = 10;
 /// A name that explains less than this share of what a nameless curve explains is not the cause.
 const NAME_ADEQUATE: f64 = 0.6;
-/// Biases by other formulas brought 97 % and more of the best curve's gain on their own axis (92
-/// development sets of 50 to 5000 nats), a dent near the middle 86 to 87 % as a bowl. Shapes of the
-/// noise's size are not as exact.
+/// The same on the name's own axis. Biases by other formulas brought 97 % and more of the best curve's
+/// gain there (92 development sets of 50 to 5000 nats), a dent near the middle 86 to 87 % as a bowl.
+/// Shapes of the noise's size are not as exact.
 const OWN_AXIS_ADEQUATE: f64 = 0.92;
-/// Precision of a coefficient of the bias: a few px at most.
+/// Prior precision of a bias coefficient: a few px at most.
 pub const BIAS_PRIOR: f64 = 0.1;
-/// Of one of log variance: a factor of e is already much.
+/// Prior precision of a log-variance coefficient: a factor of e is already much.
 pub const VARIANCE_PRIOR: f64 = 1.0;
 
 impl Survey {
-    /// Pixels of the picture that any view's target covered.
+    /// Number of image pixels covered by the target of any view.
     fn covered_px(&self, camera: &Camera) -> f64 {
         let across = camera.width.div_ceil(SIDE);
         let mut seen = vec![false; across * camera.height.div_ceil(SIDE)];
@@ -45,7 +45,7 @@ impl Survey {
         (seen.iter().filter(|s| **s).count() * SIDE * SIDE) as f64
     }
 
-    /// What these views can show of an effect.
+    /// Bounds on what these views can show of an effect.
     pub fn bounds<'a>(&'a self, camera: &'a Camera) -> Bounds<'a> {
         Bounds {
             camera,
@@ -56,7 +56,7 @@ impl Survey {
         }
     }
 
-    /// How the search of the mean decides.
+    /// Rules of the search of the mean.
     pub fn bias_rules(&self, camera: &Camera, level: f64) -> Rules {
         self.ablation.rules(Rules {
             level,
@@ -71,8 +71,8 @@ impl Survey {
         })
     }
 
-    /// The mean's terms, best first, fitted together without maps or what is usual of each.
-    /// `fine` are the views' means ([`Survey::mean_data`]).
+    /// Terms of the mean, best first, fitted together without smooth maps or priors on their usual
+    /// sizes. `fine` are the views' means ([`Survey::mean_data`]).
     pub fn search_bias(
         &self,
         fine: &[ViewData],
@@ -87,14 +87,14 @@ impl Survey {
         search(fine, &coarse, &candidates, None, &rules, seed)
     }
 
-    /// What was found of these means, fitted together.
+    /// Refits the terms found in these means jointly.
     pub fn refit_bias(&self, fine: &[ViewData], camera: &Camera, found: Outcome) -> Outcome {
         let inflation: Vec<f64> = self.views.iter().map(|v| v.inflation).collect();
         let second = self.second();
         refit(fine, &inflation, &second, camera, found.halved(&second, BIAS_PRIOR))
     }
 
-    /// How the search of the variance decides.
+    /// Rules of the search of the variance.
     pub fn variance_rules(&self, level: f64) -> Rules {
         self.ablation.rules(Rules {
             level,
@@ -109,7 +109,8 @@ impl Survey {
         })
     }
 
-    /// What is fitted beside every hypothesis of the variance.
+    /// Refit of sigma, fitted together with every hypothesis of the variance; `None` unless sigma was
+    /// calibrated on these views.
     pub fn refitted(&self) -> Option<Candidate> {
         self.refits_sigma.then(|| variance::refit(&self.reach))
     }
@@ -138,8 +139,8 @@ impl Survey {
     }
 }
 
-/// Beside every hypothesis sigma was as free as can be; told is the surface that predicts views left
-/// out best beside what was found, or none.
+/// Replaces sigma's free refit, fitted together with every hypothesis, by the surface that best
+/// predicts left-out views beside the terms found, or by none.
 fn with_best_surface(data: &[ViewData], found: Outcome, surfaces: Vec<Candidate>) -> Outcome {
     let (refit, others): (Vec<Chosen>, Vec<Chosen>) =
         found.chosen.into_iter().partition(|c| c.candidate.family == Some(RECALIBRATE));
@@ -168,7 +169,7 @@ fn with_best_surface(data: &[ViewData], found: Outcome, surfaces: Vec<Candidate>
     Outcome { chosen, fit, evidence, ..found }
 }
 
-/// The covariance of the terms, with the views as the sample.
+/// Sets the covariance of the terms, with the views as the sample.
 fn cluster(found: &mut Outcome) {
     let Some(fit) = &mut found.fit else { return };
     let beyond: Vec<DVector<f64>> =

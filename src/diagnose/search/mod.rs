@@ -1,5 +1,5 @@
-//! The search for missing terms: best first, each step judged on held-out views against what
-//! noise alone would have brought.
+//! Greedy forward search for missing terms; each step is judged on held-out views against the null
+//! distribution of the gain.
 
 pub mod bias;
 pub mod candidate;
@@ -40,13 +40,13 @@ use prepared::{Grouping, Patches, Prepared, Together, prepare};
 use rules::Rules;
 use trial::{Trial, nests};
 
-/// A later term must bring this share of what the first brought: what is less is the first one's
-/// own shape, badly met.
+/// Smallest gain of a later term, as a share of the first term's; anything smaller is a misfit of the
+/// first term's shape.
 pub const MIN_SHARE_OF_GAIN: f64 = 0.005;
 
-/// Search a layer. `coarse` has the same views in larger patches, for shapes that do not change
-/// within them. A term `beside` is fitted with every other, whatever it brings: what it can take up is
-/// attributed to no other term. It stays in, last of the chosen.
+/// Searches a layer. `coarse` holds the same views in larger patches, for shapes that do not change
+/// within them. The term `beside` is fitted together with every candidate, whatever its gain, so
+/// nothing it can explain is attributed to another term. It is kept as the last of the chosen terms.
 pub fn search(
     fine: &[ViewData],
     coarse: &[ViewData],
@@ -86,9 +86,9 @@ pub fn search(
     Outcome { chosen, looks, fit, evidence, noise, ..Outcome::default() }
 }
 
-/// The terms that a fit holds together, the first chosen first and what is pinned last: between an error that is
-/// certain to a millionth of a pixel and a prior of a pixel a fit runs out of digits, and a term that then
-/// does not fit beside those before it is not told.
+/// Returns the terms that can be fitted together, in order of choice with the pinned one last, and
+/// their fit. Between an error known to a millionth of a pixel and a prior of one pixel a fit runs out
+/// of digits; a term that then cannot be fitted together with those before it is dropped.
 fn fitted_together<T: Clone, F>(
     chosen: Vec<T>,
     pinned: Option<T>,
@@ -111,7 +111,7 @@ fn fitted_together<T: Clone, F>(
 
 struct Layer<'a> {
     together: Together<'a>,
-    /// Of every view's fine samples.
+    /// Groupings of each view's fine samples.
     groups: Vec<Vec<Grouping>>,
     candidates: &'a [Candidate],
     nests: Vec<Vec<usize>>,
@@ -120,7 +120,7 @@ struct Layer<'a> {
     looks: Vec<Look>,
     /// Root mean square of the largest term so far.
     largest: f64,
-    /// Fitted beside everything.
+    /// Fitted together with every candidate.
     pinned: Option<Chosen>,
     seed: Seed,
 }
@@ -147,8 +147,8 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Terms with a name are fitted anew beside every candidate; those without have many columns
-    /// and are taken out as they were fitted.
+    /// Prepares the views for the candidates. Named terms are refitted with every candidate; nameless
+    /// ones have many columns and are subtracted as fitted.
     fn prepare(&self, chosen: &[Chosen]) -> Vec<Prepared<'_>> {
         let named = bases_where(chosen, |c| c.family.is_some());
         let mut settled: Vec<Term> = Vec::new();
@@ -160,7 +160,7 @@ impl<'a> Layer<'a> {
                 let (mine, others) = rest.split_at(basis.count());
                 rest = others;
                 if family.is_none() {
-                    // Of the mean or of the variance, it is taken out alike.
+                    // A bias term even for the variance: both are subtracted in the same way.
                     settled.push(Term::bias(basis.clone(), mine.to_vec()));
                 }
             }
@@ -171,7 +171,7 @@ impl<'a> Layer<'a> {
         views.filter_map(|((f, c), g)| prepare(f, c, g, keep_fine, &named, &settled)).collect()
     }
 
-    /// A term that stays, with what it brings alone.
+    /// Turns a candidate into a term that stays, with the gain it brings alone.
     fn pin(&self, candidate: Candidate) -> Chosen {
         let alone = gain(&self.together.evidence(&[&candidate.basis]), self.rules.prior);
         let gain = alone.map_or(0.0, |g| g.total);
@@ -179,7 +179,7 @@ impl<'a> Layer<'a> {
         Chosen { candidate, rms: 0.0, adequacy, gain, best_curve: 0.0, rivals, p: 1.0 }
     }
 
-    /// What `chosen` and what is pinned leave for a candidate to explain.
+    /// Sets up a trial of candidates given `chosen` and the pinned term.
     fn trial(&self, chosen: &[Chosen]) -> Option<Trial<'_>> {
         let beside: Vec<Chosen> = self.pinned.iter().chain(chosen).cloned().collect();
         let views = self.prepare(&beside);
@@ -197,7 +197,8 @@ impl<'a> Layer<'a> {
         Some(Trial { beside, views, settled, base, weight, rules, largest })
     }
 
-    /// The best candidate beside `chosen` and what is pinned, if it brings more than noise can.
+    /// Returns the best candidate given `chosen` and the pinned term, if its gain exceeds the noise
+    /// threshold.
     fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
         let trial = self.trial(chosen)?;
         let of_nest = |nest: &Vec<usize>| trial.judged(self.candidates, nest);
@@ -222,7 +223,7 @@ impl<'a> Layer<'a> {
         Some(next)
     }
 
-    /// What terms bring together, beside what is pinned.
+    /// Joint gain of `terms`, given the pinned term.
     fn total(&self, terms: &[&Basis]) -> f64 {
         let pinned: Vec<&Basis> = self.pinned.iter().map(|c| &c.candidate.basis).collect();
         let columns = pinned.iter().map(|b| b.count()).sum();
@@ -231,7 +232,8 @@ impl<'a> Layer<'a> {
         alone.and_then(|alone| gain(&alone, self.rules.prior)).map_or(0.0, |g| g.total)
     }
 
-    /// What was taken before what really is there brings no more than noise beside it.
+    /// Drops terms that bring no more than noise given the others, such as one chosen before the real
+    /// cause.
     fn drop_needless(&self, chosen: &mut Vec<Chosen>) {
         let Some(noise) = &self.noise else { return };
         while chosen.len() > 1 {
@@ -241,7 +243,7 @@ impl<'a> Layer<'a> {
                 others.remove(k);
                 (k, whole - self.total(&others))
             };
-            // A name whose own axis has a curve beside it is what that curve completes.
+            // A name stays if a nameless curve on its own axis completes it.
             let completed = |k: usize| {
                 let axis = chosen[k].candidate.basis.axis();
                 let nameless = |c: &Chosen| c.candidate.family.is_none();
@@ -257,7 +259,7 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Maps with twice as many nodes, where those predict left-out views better.
+    /// Doubles the nodes of maps along each axis, where that predicts left-out views better.
     fn refine_maps(&self, chosen: &mut [Chosen]) {
         let mut so_far = None;
         for k in 0..chosen.len() {
@@ -280,8 +282,9 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// With all names in, is each still what fits best, and needed at all? The last was chosen beside the
-    /// others: it is, unless these have changed.
+    /// Re-checks every named term given the others: replaces it where another fits best, drops it where
+    /// none is needed. The last was chosen given the others, so it is checked only if these have
+    /// changed.
     fn look_back(&mut self, chosen: &mut Vec<Chosen>) {
         let (mut k, mut changed) = (0, false);
         while chosen.len() > 1 && k < chosen.len() {
@@ -300,7 +303,7 @@ impl<'a> Layer<'a> {
                     changed |= new.candidate.basis != old.candidate.basis;
                     chosen[k] = Chosen { p: old.p.min(new.p), ..new };
                 }
-                // Another name is taken; a curve without one is not.
+                // Another name replaces it; a nameless curve does not.
                 Some(new) if new.candidate.family.is_some() => {
                     changed = true;
                     chosen[k] = new;

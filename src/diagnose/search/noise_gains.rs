@@ -1,22 +1,22 @@
-//! What noise alone brings for the best of all candidates.
+//! Null distribution of the best candidate's gain.
 
 use rayon::prelude::*;
 
 use super::null::Null;
 use crate::rng::Seed;
 
-/// The greatest gains that noise alone brings, nats.
+/// Largest gains of all candidates under noise alone, nats.
 #[derive(Debug, Clone, Default)]
 pub struct NoiseGains {
     ascending: Vec<f64>,
-    /// Minimum mean excess of the tail: a few gains that happen to be close show too short a one.
+    /// Lower bound on the tail's mean excess: a few gains that happen to be close give too small a one.
     min_excess: f64,
 }
 
 /// Simulations of the null.
 const REPLICATES: u64 = 600;
 pub const MIN_EXCESS: f64 = 0.5;
-/// Beyond this quantile the tail of a log likelihood falls as an exponential.
+/// Upper-tail probability beyond which a log-likelihood is taken to fall off exponentially.
 const TAIL: f64 = 0.1;
 
 impl NoiseGains {
@@ -27,7 +27,7 @@ impl NoiseGains {
         })
     }
 
-    /// `draw` gives the gain of one simulation by its number.
+    /// `draw` returns the gain of one simulation, given its number.
     pub fn simulated(
         replicates: u64,
         min_excess: f64,
@@ -38,12 +38,12 @@ impl NoiseGains {
         NoiseGains { ascending, min_excess }
     }
 
-    /// Was there anything to draw from?
+    /// Whether there are any simulated gains.
     pub fn is_tested(&self) -> bool {
         !self.ascending.is_empty()
     }
 
-    /// Noise is taken to bring next to nothing.
+    /// A null in which noise brings next to nothing.
     pub fn unknown() -> Self {
         NoiseGains { ascending: vec![0.0], min_excess: MIN_EXCESS }
     }
@@ -57,7 +57,7 @@ impl NoiseGains {
         (cut, mean_excess.max(self.min_excess))
     }
 
-    /// Exceeded with probability `level`.
+    /// Gain that noise exceeds with probability `level`; infinite where nothing was simulated.
     pub fn threshold(&self, level: f64) -> f64 {
         if !self.is_tested() {
             return f64::INFINITY;
@@ -66,7 +66,7 @@ impl NoiseGains {
         cut + mean_excess * (TAIL / level).ln().max(0.0)
     }
 
-    /// Chance of exceeding `gain`.
+    /// Chance that noise exceeds `gain`; 1 where nothing was simulated.
     pub fn p(&self, gain: f64) -> f64 {
         if !self.is_tested() {
             return 1.0;

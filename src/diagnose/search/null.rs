@@ -1,4 +1,4 @@
-//! What noise alone brings for a candidate.
+//! Null distribution of a candidate's gain.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
@@ -7,18 +7,18 @@ use super::evidence::Evidence;
 use super::rules::Rules;
 use crate::rng::Stream;
 
-/// What noise alone may bring for a candidate: b ~ N(0, A) in every view.
+/// Distribution of a candidate's gain under noise alone: b ~ N(0, A) in every view.
 ///
-/// Worked in the eigenvectors of the summed A, in which the views' own A are taken as diagonal:
-/// exact when the views' A are multiples of one another, and a thousand times quicker.
+/// Computed in the eigenvectors of the summed A, where each view's A is taken as diagonal: exact if the
+/// views' A are multiples of one another, and a thousand times faster.
 pub struct Null {
-    /// Of each eigenvector: what each view says of it, and its total.
+    /// For each eigenvector, the information of each view and the total.
     vectors: Vec<(Vec<Information>, f64)>,
     prior: f64,
-    /// How much more the views' own fits scatter than their noise explains, at least 1: about the
-    /// common fit, or about nothing at all where a few views have what the others have not.
+    /// Dispersion of the views' fits over their noise, at least 1: about the common fit, or about zero
+    /// where only a few views have the term.
     pub dispersion: f64,
-    /// The same about the common fit alone.
+    /// Dispersion about the common fit.
     pub about_fit: f64,
 }
 
@@ -29,12 +29,12 @@ struct Information {
 }
 
 impl Null {
-    /// For the columns from number `chosen` on, given the columns before them.
+    /// Null of the columns from `chosen` on, given the columns before them.
     pub fn of(views: &[Evidence], chosen: usize, prior: f64) -> Option<Self> {
         Null::of_candidate(&beside_chosen(views, chosen, prior)?, prior)
     }
 
-    /// The same for what [`beside_chosen`] makes of the views.
+    /// Null of evidence that [`beside_chosen`] has reduced.
     pub fn of_candidate(alone: &[Evidence], prior: f64) -> Option<Self> {
         let k = alone.first()?.b.len();
         let u = Evidence::sum(k, 0.0, alone).a.symmetric_eigen().eigenvectors;
@@ -54,17 +54,17 @@ impl Null {
         Some(Null { vectors, prior, dispersion, about_fit })
     }
 
-    /// Nats that count against what noise brings, by `rules`, of a gain over so many views: views
-    /// that scatter more than their noise says count for less. Held against what other views taught,
-    /// their scatter is the noise; it was measured on few views, which makes a Student's t of a
-    /// Gaussian.
+    /// Calibrates a gain over so many views by `rules`, for comparison with the null distribution,
+    /// nats: views that scatter more than their noise count for less. Against a model learnt from other
+    /// views, this scatter is the noise. It is estimated from few views, so the Gaussian becomes a
+    /// Student's t.
     pub fn calibrated_gain(&self, gain: f64, views: usize, rules: &Rules) -> f64 {
         let nats = gain / self.excess(views, rules);
         let judged_by_t = rules.learnt_from.is_some() && nats > 0.0;
         if judged_by_t { student(nats, freedom(views)) } else { nats }
     }
 
-    /// The gain that counts for so many nats: the other way round.
+    /// Gain for so many calibrated nats: the inverse of [`Null::calibrated_gain`].
     pub fn gain_for(&self, calibrated_gain: f64, views: usize, rules: &Rules) -> f64 {
         let nats = if rules.learnt_from.is_some() {
             gaussian(calibrated_gain, freedom(views))
@@ -74,17 +74,17 @@ impl Null {
         nats * self.excess(views, rules)
     }
 
-    /// How much further than by their noise so many views may be off, in variance.
+    /// Variance of the errors of so many views over that of their noise.
     fn excess(&self, views: usize, rules: &Rules) -> f64 {
         self.scatter(rules) * rules.learnt_from.map_or(1.0, |model| model.excess(views as f64))
     }
 
-    /// The views' own scatter that counts, over their noise.
+    /// Dispersion of the views that applies under `rules`.
     pub fn scatter(&self, rules: &Rules) -> f64 {
         if rules.learnt_from.is_some() { self.about_fit } else { self.dispersion }
     }
 
-    /// The gain of one recording of nothing but noise, nats.
+    /// Draws the gain of one recording of pure noise, nats.
     pub fn draw(&self, rng: &mut Stream) -> f64 {
         let mut gain = 0.0;
         let mut b = Vec::new();
@@ -109,18 +109,19 @@ fn freedom(views: usize) -> f64 {
     (views as f64 - 1.0).max(1.0)
 }
 
-/// Nats of a Gaussian whose error was measured with so many degrees of freedom: of a Student's t.
+/// Converts Gaussian nats to those of Student's t, for an error estimated with `freedom` degrees of
+/// freedom.
 pub fn student(nats: f64, freedom: f64) -> f64 {
     0.5 * freedom * (2.0 * nats / freedom).ln_1p()
 }
 
-/// The other way round.
+/// Inverse of [`student`].
 fn gaussian(nats: f64, freedom: f64) -> f64 {
     0.5 * freedom * (2.0 * nats / freedom).exp_m1()
 }
 
-/// What each view says of a candidate once the chosen terms, the columns before its own, are fitted with it to
-/// all views.
+/// Evidence of each view on a candidate, with the chosen terms (the columns before its own) fitted
+/// jointly to all views.
 pub fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<Vec<Evidence>> {
     let n = views.first()?.b.len();
     let k = n - chosen;
@@ -150,7 +151,7 @@ pub fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<Ve
     Some(alone.collect())
 }
 
-/// Scatter of the views' scores about the common fit, over what noise gives them.
+/// Dispersion of the views' scores about the common fit, relative to noise.
 fn dispersion(
     alone: &[Evidence],
     by_view: &[Vec<f64>],
@@ -162,7 +163,7 @@ fn dispersion(
     let whole = Evidence::sum(u.nrows(), prior, alone);
     let Some(factor) = whole.a.cholesky() else { return 1.0 };
     let beta = factor.solve(&whole.b);
-    // What each view says beyond the common fit.
+    // Scores left by the common fit.
     let left: Vec<DVector<f64>> = alone.iter().map(|e| &e.b - &e.a * &beta).collect();
     let (mut sum, mut n) = (0.0, 0.0);
     for (j, &total) in total.iter().enumerate() {
@@ -170,7 +171,7 @@ fn dispersion(
             continue;
         }
         for (left, a) in left.iter().zip(by_view) {
-            // A view that says next to nothing would divide by next to nothing.
+            // A view with almost no information would divide by almost zero.
             if a[j] > 1e-3 * total {
                 sum += u.column(j).dot(left).powi(2) / a[j];
                 n += 1.0 - a[j] / total;
@@ -180,12 +181,12 @@ fn dispersion(
     if n < 1.0 {
         return 1.0;
     }
-    // Chance alone scatters the estimate by the root of 2 / n.
+    // Less one standard error of the estimate, sqrt(2 / n).
     (sum / n - f64::sqrt(2.0 / n)).max(1.0)
 }
 
-/// Median of the views' squared scores, over what noise gives them: near 1 where most views have
-/// nothing of the candidate, whatever the others have.
+/// Median of the views' squared scores, relative to noise: near 1 where most views do not have the
+/// term, whatever the others show.
 fn usual_square(by_view: &[Vec<f64>], total: &[f64], u: &DMatrix<f64>, alone: &[Evidence]) -> f64 {
     let most = total.iter().copied().fold(0.0, f64::max);
     let mut squares = Vec::new();
@@ -198,7 +199,7 @@ fn usual_square(by_view: &[Vec<f64>], total: &[f64], u: &DMatrix<f64>, alone: &[
     }
     let (half, n) = (squares.len() / 2, squares.len() as f64);
     let middle = *squares.select_nth_unstable_by(half, f64::total_cmp).1;
-    // By one standard error of the median more, for safety.
+    // Enlarged by one standard error of the median, for safety.
     (middle / CHI2_MEDIAN * (1.0 + MEDIAN_ERROR / n.sqrt())).max(1.0)
 }
 

@@ -1,4 +1,4 @@
-//! The null beside noise that is drawn sample by sample.
+//! The null distribution against noise simulated sample by sample.
 
 use super::*;
 use crate::diagnose::search::evidence::gain;
@@ -6,8 +6,8 @@ use crate::diagnose::search::evidence::tests::{View, normal};
 use crate::diagnose::views::learnt::Learnt;
 use crate::rng::{Seed, Stream};
 
-/// What `detectable` asks for is what the search lets pass, with a model of other views and
-/// without.
+/// The gain that `detectable` asks for is the one the search accepts, with and without a model of other
+/// views.
 #[test]
 fn the_gain_for_so_many_nats_counts_for_as_many() {
     let null = Null { vectors: Vec::new(), prior: 1.0, dispersion: 1.5, about_fit: 3.0 };
@@ -37,8 +37,8 @@ fn the_gain_for_so_many_nats_counts_for_as_many() {
 
 const DRAWS: usize = 4000;
 
-/// Gains of the candidate over the chosen terms in recordings of nothing but noise, by way of
-/// every sample; the chosen terms have true coefficients that are not zero.
+/// Gains of the candidate over the chosen terms in recordings of pure noise, simulated sample by
+/// sample; the chosen terms have nonzero true coefficients.
 fn simulated(views: &[View], prior: f64, rng: &mut Stream) -> Vec<f64> {
     let chosen = views[0].chosen.ncols();
     let mut noisy: Vec<View> = views.to_vec();
@@ -68,7 +68,7 @@ fn drawn(views: &[View], prior: f64, rng: &mut Stream) -> Vec<f64> {
     gains
 }
 
-/// Greatest distance of two samples' distribution functions.
+/// Greatest distance between two samples' distribution functions.
 fn kolmogorov_smirnov(a: &[f64], b: &[f64]) -> f64 {
     a.iter()
         .map(|x| {
@@ -78,14 +78,14 @@ fn kolmogorov_smirnov(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The same columns in every view, in others' weight.
+/// Views with the same columns and different weights.
 fn multiples(chosen: usize, candidate: usize, rng: &mut Stream) -> Vec<View> {
     let one = View { precision: vec![0.0; 3], ..View::draw(25, chosen, candidate, rng) };
     (0..7).map(|v| View { w: &one.w * (0.5 + f64::from(v)), ..one.clone() }).collect()
 }
 
-/// Where the views' information differs by a factor alone the drawn gains are those of noise.
-/// False alarm of each Kolmogorov-Smirnov test: 1e-4.
+/// Where the views' information differs only by a factor, the drawn gains are distributed as those of
+/// noise. False-alarm rate of each Kolmogorov-Smirnov test: 1e-4.
 #[test]
 fn noise_is_drawn_as_noise_brings_it_where_views_are_alike() {
     let bound = (-(0.5e-4f64).ln() / 2.0).sqrt() * (2.0 / DRAWS as f64).sqrt();
@@ -98,9 +98,10 @@ fn noise_is_drawn_as_noise_brings_it_where_views_are_alike() {
     }
 }
 
-/// In views that differ, with terms chosen before: the quick null's 95 % and 99 % quantiles are
-/// passed by noise as often as they say, to a third. Monte Carlo alone moves these shares by 7 %
-/// and 16 % (one standard deviation of 4,000 brute against 4,000 quick draws is root two of it).
+/// Views that differ, with chosen terms: noise exceeds the drawn 95 % and 99 % quantiles at most 4/3
+/// and 5/3 times as often as it should, and no less than a third as often. Monte Carlo alone moves
+/// these shares by 7 % and 16 % (one standard deviation; root two times that for 4,000 simulated
+/// against 4,000 drawn gains).
 #[test]
 fn noise_is_drawn_nearly_so_where_views_differ() {
     for (seed, chosen, candidate) in [(1, 0, 3), (2, 2, 3), (3, 1, 8)] {
@@ -125,7 +126,7 @@ fn noise_is_drawn_nearly_so_where_views_differ() {
     }
 }
 
-/// Scatter of twelve views about a common coefficient, each with its own beside it.
+/// Dispersion of twelve views whose coefficients scatter by `apart` about `common`.
 fn scatter(common: f64, apart: f64, rng: &mut Stream) -> f64 {
     let evidence: Vec<Evidence> = (0..12)
         .map(|_| {
@@ -139,9 +140,9 @@ fn scatter(common: f64, apart: f64, rng: &mut Stream) -> f64 {
     Null::of(&evidence, 1, 1e-6).unwrap().dispersion
 }
 
-/// 33 degrees of freedom: the sum of squares over them has a standard deviation of 0.25, which is
-/// taken off once already; 1.75 is four of them off, in 20 draws a chance of 2e-3 for the skewed
-/// tail. The second bound is the information of about 100 units a view: 1 + 100 * 0.5^2 = 26.
+/// With 33 degrees of freedom the mean square has a standard deviation of 0.25, one of which is already
+/// subtracted. 1.75 is four of them off: a chance of 2e-3 in 20 draws, for the skewed tail. The second
+/// bound is from an information of about 100 units per view: 1 + 100 * 0.5^2 = 26.
 #[test]
 fn views_that_disagree_are_seen_to() {
     let mut rng = Seed(5).stream("evidence/dispersion");
@@ -153,7 +154,7 @@ fn views_that_disagree_are_seen_to() {
     assert!(wild > 5.0, "{wild}");
 }
 
-/// Views that agree do not scatter, however strong what they agree on.
+/// Views that agree do not scatter, however large the common coefficient.
 #[test]
 fn views_that_agree_on_something_strong_do_not_scatter() {
     let mut rng = Seed(6).stream("evidence/agree");

@@ -1,4 +1,4 @@
-//! What a search comes to.
+//! Results of a search.
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
@@ -7,12 +7,12 @@ use crate::diagnose::checks::replication::Halves;
 use crate::model::Covariance;
 use crate::terms::Basis;
 
-/// A family beside the one that was chosen.
+/// A family that competes with the chosen one.
 #[derive(Debug, Clone)]
 pub struct Rival {
     pub family: &'static str,
     pub basis: Basis,
-    /// Nats over the terms before, over the root of how much more than noise the views disagree.
+    /// Nats over the terms before, divided by the root of the views' dispersion beyond chance.
     pub gain: f64,
     /// How far behind the chosen one, in standard errors over the views.
     pub behind: f64,
@@ -24,19 +24,19 @@ pub struct Chosen {
     pub candidate: Candidate,
     /// Root mean square, in the response's unit.
     pub rms: f64,
-    /// The share of the best curve that its name had to explain.
+    /// Share of the best curve's gain that its name had to reach.
     pub adequacy: f64,
     /// Nats over the terms before it.
     pub gain: f64,
-    /// The best nameless curve's at the same step, nats.
+    /// Gain of the best nameless curve at the same step, nats.
     pub best_curve: f64,
-    /// All families at this step, best first, the chosen one too where it has a name.
+    /// All families at this step, best first, including the chosen one if it has a name.
     pub rivals: Vec<Rival>,
-    /// Chance that noise brings as much anywhere in this layer.
+    /// Chance that noise alone brings as much anywhere in this layer.
     pub p: f64,
 }
 
-/// What a single nameless curve saw, before anything was explained.
+/// Fit of a single nameless curve before any term is chosen.
 #[derive(Debug, Clone)]
 pub struct Look {
     pub basis: Basis,
@@ -48,26 +48,26 @@ pub struct Look {
 #[derive(Default)]
 pub struct Outcome {
     pub chosen: Vec<Chosen>,
-    /// Every nameless curve on its own, on the data as they came.
+    /// Every nameless curve on its own, fitted to the original data.
     pub looks: Vec<Look>,
     /// Fit of all terms at once.
     pub fit: Option<Gain>,
     pub evidence: Vec<Evidence>,
     pub noise: NoiseGains,
-    /// All terms as either half of the views has them.
+    /// All terms fitted to each half of the views.
     pub halves: Option<Halves>,
-    /// Of all coefficients.
+    /// Covariance of all coefficients.
     pub covariance: Covariance,
 }
 
 impl Outcome {
-    /// Coefficients of term number `k` in the common fit: the first and the one after the last.
+    /// Range of the coefficients of term `k` in the common fit.
     pub fn span(&self, k: usize) -> std::ops::Range<usize> {
         let first = self.chosen[..k].iter().map(|c| c.candidate.basis.count()).sum();
         first..first + self.chosen[k].candidate.basis.count()
     }
 
-    /// With the halves' fits, for views in these halves.
+    /// Adds the halves' fits; `second` says which half each view is in.
     pub fn halved(mut self, second: &[bool], prior: f64) -> Self {
         let counts: Vec<usize> = self.chosen.iter().map(|c| c.candidate.basis.count()).collect();
         self.halves = Halves::of(&self.evidence, second, prior, &counts);
@@ -80,7 +80,7 @@ impl Outcome {
     }
 }
 
-/// Of all chosen terms, one after the other.
+/// Bases of all chosen terms, in order.
 pub fn bases(chosen: &[Chosen]) -> Vec<&Basis> {
     bases_where(chosen, |_| true)
 }

@@ -1,4 +1,4 @@
-//! The period between those that were tried.
+//! Refines a period between those that were tried.
 
 use super::candidate::Candidate;
 use super::outcome::{Chosen, bases};
@@ -6,15 +6,15 @@ use crate::solve::brent;
 use crate::stats::range;
 use crate::terms::Basis;
 
-/// Of the way from one period to the next that is tried: at 5,000 nats a sine's period is known to a
-/// hundredth of what turns it by half a cycle over the picture (its Cramer-Rao bound), and this is a fifth.
+/// Tolerance, as a share of the step between tried periods: a fifth of the Cramer-Rao bound at 5,000
+/// nats, which is a hundredth of the step that turns a sine by half a cycle over the image.
 const TO_SHARE: f64 = 0.002;
 /// Brent's method needs about ten.
 const MAX_STEPS: u64 = 30;
 
-/// Take the period with which a named `next` brings the largest gain beside `chosen`, from the one that was
-/// tried before it to the one after it; a curve without a name has no formula to follow. `total` is what terms
-/// bring together, nats.
+/// Tunes the period of a named `next` to the largest gain beside `chosen`, between the tried periods
+/// next to its own. A nameless curve has no formula to follow. `total` is the joint gain of terms,
+/// nats.
 pub fn tune(
     candidates: &[Candidate],
     chosen: &[Chosen],
@@ -26,7 +26,7 @@ pub fn tune(
     let beside = bases(chosen);
     let gain =
         |period: f64| total(&[&beside[..], &[&next.candidate.basis.with_period(period)]].concat());
-    // Evenly spaced are the cycles over the picture.
+    // The tried periods are evenly spaced in cycles over the image.
     let cycles = [1.0 / high, 1.0 / low];
     let tolerance = TO_SHARE * 0.5 * (cycles[1] - cycles[0]);
     let Some(best) = brent(|cycles| -gain(1.0 / cycles), cycles, tolerance, MAX_STEPS) else {
@@ -40,8 +40,7 @@ pub fn tune(
     }
 }
 
-/// The next smaller and the next larger period among the candidates of a kind; `None` where there is but
-/// one.
+/// Next smaller and next larger period among candidates of the same kind; `None` if there is only one.
 fn neighbours(candidates: &[Candidate], of: &Candidate) -> Option<[f64; 2]> {
     let period = of.basis.period()?;
     let is_like = |c: &&Candidate| {
@@ -75,7 +74,7 @@ mod tests {
         Candidate::named("column-banding", Basis::waves(Coordinate::Column, period, 1))
     }
 
-    /// Least squares of the columns' means.
+    /// Least-squares fit to the column means.
     fn fit(basis: &Basis, means: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let mut g = DMatrix::zeros(COLUMNS, 2);
         let mut row = [0.0; 2];
@@ -88,8 +87,8 @@ mod tests {
         (&covariance * g.tr_mul(means) / NOISE_PX.powi(2), covariance)
     }
 
-    /// Sines between the periods that are tried: 90 % of 200 are 180; fewer than 167 have a chance of
-    /// 1e-3 (numpy).
+    /// Sines between the tried periods: 90 % of 200 are 180; fewer than 167 have a chance of 1e-3
+    /// (numpy).
     #[test]
     fn the_period_between_those_tried_is_found_and_its_error_holds() {
         let candidates: Vec<Candidate> = (6..=64).map(stripes).collect();

@@ -1,14 +1,14 @@
-//! Means over the nodes of a grid, each as probable as its evidence makes it.
+//! Posterior means over the nodes of a grid, weighted by their evidence.
 
 pub struct Posterior<T> {
-    /// With their weights.
+    /// Nodes with their weights.
     nodes: Vec<(f64, T)>,
     total: f64,
 }
 
 impl<T> Posterior<T> {
-    /// `evidence` is a node's log likelihood with its prior, nats, and the volume that it stands for.
-    /// `None` where nothing is possible.
+    /// `evidence` returns a node's log-likelihood plus log-prior, nats, and the volume it represents.
+    /// `None` if no node has any weight.
     pub fn of(nodes: Vec<T>, evidence: impl Fn(&T) -> (f64, f64)) -> Option<Self> {
         let best = nodes.iter().map(|n| evidence(n).0).fold(f64::NEG_INFINITY, f64::max);
         let weigh = |node| {
@@ -34,7 +34,7 @@ impl<T> Posterior<T> {
 mod tests {
     use super::*;
 
-    /// A Gaussian of standard deviation 2 about 5, by nodes that lie four times as dense on one side.
+    /// A Gaussian of standard deviation 2 about 5, on nodes four times as dense on one side.
     #[test]
     fn a_gaussian_comes_back_whatever_the_grid() {
         let dense = (0..4000).map(|k| (-15.0 + k as f64 * 0.005, 0.005));

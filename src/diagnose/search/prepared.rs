@@ -1,5 +1,5 @@
-//! A view made ready for candidates: what is fitted beside them, and samples that they cannot tell
-//! apart made one.
+//! A view prepared for candidates: the columns fitted alongside them, with samples that a candidate
+//! cannot tell apart merged.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -17,12 +17,12 @@ pub fn evidence_of_bases(data: &[ViewData], bases: &[&Basis]) -> Vec<Evidence> {
     data.par_iter().filter_map(|v| together(v, bases)).collect()
 }
 
-/// A layer's views, on which several terms are fitted together.
+/// A layer's views, for joint fits of several terms.
 pub struct Together<'a> {
     pub fine: &'a [ViewData],
     /// The same views in larger patches.
     pub coarse: &'a [ViewData],
-    /// What was asked for last: it is often asked for again.
+    /// The last answer, which is often requested again.
     last: RefCell<Option<Answer>>,
 }
 
@@ -34,7 +34,7 @@ impl<'a> Together<'a> {
         Together { fine, coarse, last: RefCell::new(None) }
     }
 
-    /// Evidence of the views on these terms, on fine patches where one of them needs them.
+    /// Evidence of the views on these terms, from fine patches if any term needs them.
     pub fn evidence(&self, terms: &[&Basis]) -> Rc<Vec<Evidence>> {
         let mut last = self.last.borrow_mut();
         if let Some((of, evidence)) = &*last
@@ -51,16 +51,16 @@ impl<'a> Together<'a> {
     }
 }
 
-/// A view made ready for the candidates.
+/// A view prepared for the candidates.
 pub struct Prepared<'a> {
-    /// Where a candidate is fine and does not depend on one coordinate alone.
+    /// Kept for fine candidates that do not depend on a single coordinate.
     fine: Option<(&'a [PixelContext], Rows<'a>)>,
     pub coarse: (&'a [PixelContext], Rows<'a>),
-    /// The fine samples gathered by one coordinate.
+    /// The fine samples grouped by one coordinate.
     groups: Vec<(&'a Grouping, Rows<'a>)>,
 }
 
-/// Side of a neighbourhood in patches: few nodes of a curve or a map are within it.
+/// Side of a block of samples, in patches; few nodes of a curve or map lie within one.
 const NEIGHBOURS: f64 = 8.0;
 
 /// A view's normal equations on these terms together.
@@ -77,7 +77,7 @@ pub fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
     Some(rows.reduce_by_blocks(count, block, |_| (0..count).collect(), fill))
 }
 
-/// The columns of several terms, one after the other.
+/// Fills the columns of several terms, one after the other.
 fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
     let mut rest = row;
     for basis in terms {
@@ -87,7 +87,7 @@ fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
     }
 }
 
-/// A view's rows with its nuisances and the terms beside.
+/// A view's rows with its nuisances and the columns of the terms `beside`.
 fn rows<'a>(view: &'a ViewData, response: &[f64], beside: &[&Basis]) -> Option<Rows<'a>> {
     let p = view.precision.len();
     if beside.is_empty() {
@@ -114,7 +114,7 @@ pub fn prepare<'a>(
     let left_coarse = if coarse.gathered.is_empty() {
         left.clone()
     } else {
-        // What changes within a patch is taken out before the patch is made.
+        // Terms that vary within a patch are subtracted before averaging over it.
         let mut sums = vec![0.0; coarse.places.len()];
         for ((y, w), &k) in left.iter().zip(&fine.weight).zip(&coarse.gathered) {
             sums[k as usize] += w * y;
@@ -131,21 +131,21 @@ pub fn prepare<'a>(
     })
 }
 
-/// Disparities this near are one, px: a thirtieth of a locking's period.
+/// Width of a group of disparities, px: a thirtieth of the pixel-locking period.
 const DISPARITY_GROUP_PX: f64 = 1.0 / 30.0;
 const EDGE_GROUP_PX: f64 = 0.5;
 
-/// A view's samples in steps of one coordinate.
+/// A view's samples grouped in steps of one coordinate.
 pub struct Grouping {
     over: Coordinate,
-    /// Each group lies where its samples do on average.
+    /// Mean place of each group's samples.
     places: Vec<PixelContext>,
     /// The group of each sample.
     of: Vec<u32>,
 }
 
 impl Grouping {
-    /// By every coordinate that a shape may depend on alone.
+    /// Groupings by each coordinate that a shape may depend on alone.
     pub fn all(view: &ViewData) -> Vec<Self> {
         let side = SIDE as f64;
         let steps = [
@@ -177,7 +177,7 @@ impl Grouping {
     }
 }
 
-/// Which samples a basis is tried on. What stands beside it brings more on the fine ones.
+/// Which samples a basis is tried on; the terms alongside gain more on the fine ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Patches {
     Fine,
@@ -185,7 +185,7 @@ pub enum Patches {
 }
 
 impl Prepared<'_> {
-    /// The samples that a basis is tried on, and which they are.
+    /// Samples that a basis is tried on, and their kind.
     fn samples(&self, basis: &Basis) -> (&[PixelContext], &Rows<'_>, Patches) {
         let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
         if let Some((group, rows)) = alone {
@@ -201,14 +201,14 @@ impl Prepared<'_> {
         self.samples(basis).2
     }
 
-    /// Evidence on what stands beside every candidate. However fine samples are gathered, it is the
-    /// same.
+    /// Evidence on the terms fitted alongside every candidate; grouping the fine samples does not
+    /// change it.
     pub fn beside(&self, patches: Patches) -> Evidence {
         let fine = self.groups.first().filter(|_| patches == Patches::Fine);
         fine.map_or(&self.coarse.1, |(_, rows)| rows).reduce(0, |_, _| ())
     }
 
-    /// On the basis and what stands beside it.
+    /// Evidence on the terms fitted alongside and the basis.
     pub fn evidence(&self, basis: &Basis) -> Evidence {
         let (places, rows, _) = self.samples(basis);
         rows.reduce(basis.count(), |i, g| basis.fill(&places[i], g))

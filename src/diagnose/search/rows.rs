@@ -1,4 +1,4 @@
-//! One view's samples, and the evidence that columns make of them.
+//! One view's samples, and the evidence on columns that they reduce to.
 
 use std::borrow::Cow;
 
@@ -6,17 +6,17 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
 
-/// One view's data with what is fitted beside every candidate: its own nuisances, and the terms
+/// One view's data with the columns fitted alongside every candidate: its nuisances and the terms
 /// already chosen.
 pub struct Rows<'a> {
     /// Inverse variance, in independent samples.
     weight: Cow<'a, [f64]>,
-    /// A row a sample: nuisances, then the chosen terms' columns, then the response.
+    /// One row per sample: nuisances, then the chosen terms' columns, then the response.
     samples: Vec<f64>,
     nuisances: usize,
-    /// Columns beside the candidate's.
+    /// Number of nuisance and chosen-term columns.
     width: usize,
-    /// Normal equations of what is beside, before anything is profiled out.
+    /// Normal equations of these columns, before the nuisances are profiled out.
     own: DMatrix<f64>,
     seen: DVector<f64>,
     /// Inverse of the nuisances' own block.
@@ -24,9 +24,8 @@ pub struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// `beside` is row-major with `width` columns, of which the first are the nuisances, one for
-    /// each entry of `precision`, which holds them to zero (0: free). `None` when the nuisances
-    /// cannot be told apart.
+    /// `beside` is row-major with `width` columns. The first are the nuisances, one for each entry of
+    /// `precision`, their prior precision about zero (0: free). `None` if the nuisances are collinear.
     pub fn new(
         response: &[f64],
         weight: &'a [f64],
@@ -51,7 +50,7 @@ impl<'a> Rows<'a> {
         Some(Rows { weight, samples, nuisances: p, width, own, seen, inverse })
     }
 
-    /// Samples that share a key made one: exact for columns that depend on the key alone.
+    /// Merges samples that share a key; exact for columns that depend on the key alone.
     pub fn grouped(&self, keys: usize, key: impl Fn(usize) -> usize) -> Self {
         let n = self.width + 1;
         let mut weight = vec![0.0; keys];
@@ -70,20 +69,20 @@ impl<'a> Rows<'a> {
         Rows { weight, samples, nuisances: self.nuisances, width: self.width, own, seen, inverse }
     }
 
-    /// Weighted square that the nuisances (and chosen terms) explain.
+    /// Weighted sum of squares that the nuisances explain.
     pub fn explained(&self) -> f64 {
         let p = self.nuisances;
         let seen = self.seen.rows(0, p);
         (&self.inverse * seen).dot(&seen)
     }
 
-    /// Sample number `i`: what is beside, and the response.
+    /// Row of sample `i`: nuisances, chosen terms and response.
     fn sample(&self, i: usize) -> &[f64] {
         let n = self.width + 1;
         &self.samples[i * n..][..n]
     }
 
-    /// Numbers of the samples that weigh anything.
+    /// Indices of the samples with positive weight.
     fn used(&self) -> impl Iterator<Item = usize> {
         (0..self.weight.len()).filter(|&i| self.weight[i] > 0.0)
     }
@@ -100,7 +99,7 @@ impl<'a> Rows<'a> {
         for i in self.used().take_while(|_| count > 0) {
             columns(i, &mut g);
             let (w, sample) = (self.weight[i], self.sample(i));
-            // Curves touch two of their many columns.
+            // Curves have only two nonzero columns per sample.
             touched.clear();
             touched.extend((0..count).filter(|&j| g[j] != 0.0));
             for (t, &j) in touched.iter().enumerate() {
@@ -125,14 +124,14 @@ impl<'a> Rows<'a> {
         sum
     }
 
-    /// Before any sample has said something of `count` columns.
+    /// Zero evidence on the chosen terms and `count` columns.
     fn nothing(&self, count: usize) -> Evidence {
         Evidence::zeros(self.width - self.nuisances + count)
     }
 
-    /// The same for many columns, of which samples near each other touch the same few: `block` is
-    /// the number of a sample's neighbourhood, `touched` the columns that may not be zero in one, and
-    /// `columns` fills these alone.
+    /// Like [`Rows::reduce`], for many columns of which neighbouring samples touch the same few.
+    /// `block` gives a sample's neighbourhood, `touched` the columns that may be nonzero in one, and
+    /// `columns` fills only these.
     pub fn reduce_by_blocks(
         &self,
         count: usize,
@@ -146,8 +145,7 @@ impl<'a> Rows<'a> {
         sum
     }
 
-    /// The same added to `sum`, of which only the lower triangle is kept: it is to be filled when all views
-    /// are in.
+    /// Adds the same to `sum`, lower triangle only; the upper one is to be filled after the last view.
     pub fn add_by_blocks(
         &self,
         sum: &mut Evidence,
@@ -172,8 +170,9 @@ impl<'a> Rows<'a> {
         self.profile(sum, &cross);
     }
 
-    /// Adds the columns' own products to `sum`, and gives those with all that is beside them and with the
-    /// response. `rows` appends, sample by sample, the columns of a block that it then names.
+    /// Adds the products of the columns with each other to `sum`, and returns those with the nuisances,
+    /// the chosen terms and the response. `rows` appends a block's columns, sample by sample, and
+    /// returns their indices.
     fn sum_blocks(
         &self,
         sum: &mut Evidence,
@@ -208,8 +207,8 @@ impl<'a> Rows<'a> {
         cross
     }
 
-    /// A column a sample: its own `count` columns, what is beside, and the response, times the root
-    /// of its weight.
+    /// One column per sample: its `count` candidate columns, nuisances, chosen terms and response,
+    /// times the root of its weight.
     fn weighted(&self, members: &[(usize, usize)], rows: &[f64], count: usize) -> DMatrix<f64> {
         let height = count + self.width + 1;
         let mut all = Vec::with_capacity(members.len() * height);
@@ -221,8 +220,8 @@ impl<'a> Rows<'a> {
         DMatrix::from_vec(height, members.len(), all)
     }
 
-    /// Adds the chosen terms' own equations and their products with the candidate's columns, `cross`, and
-    /// takes out what the nuisances explain. The lower triangle alone is kept.
+    /// Adds the chosen terms' normal equations and their products with the candidate's columns,
+    /// `cross`, and profiles out the nuisances. Only the lower triangle is kept.
     fn profile(&self, sum: &mut Evidence, cross: &DMatrix<f64>) {
         let (p, count) = (self.nuisances, cross.ncols());
         let m = self.width - p;
@@ -231,7 +230,7 @@ impl<'a> Rows<'a> {
         sum.a.view_mut((0, 0), (m, m)).zip_apply(&chosen, |sum, a| *sum += a);
         let beside = cross.view((p, 0), (m, count)).transpose();
         sum.a.view_mut((m, 0), (count, m)).zip_apply(&beside, |sum, a| *sum += a);
-        // The nuisances against all of it.
+        // Products of the nuisances with all columns.
         let mut shared = DMatrix::<f64>::zeros(p, n);
         shared.view_mut((0, 0), (p, m)).copy_from(&self.own.view((0, p), (p, m)));
         shared.view_mut((0, m), (p, count)).copy_from(&cross.view((0, 0), (p, count)));
@@ -249,9 +248,9 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Columns of a block that are multiplied at once with all that follow; the last strip has what is over,
-/// too. Twice the kernel's width of the matrix product, and few beside a block of two maps, which has 32
-/// and the terms'.
+/// Columns of a block multiplied at once with all that follow; the last strip also takes the remainder.
+/// Twice the width of the matrix product's kernel, and small against a block of two maps, which has 32
+/// columns plus the terms'.
 const STRIP: usize = 16;
 /// Samples multiplied at once.
 const AT_ONCE: usize = 512;
@@ -269,7 +268,7 @@ fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
     sum
 }
 
-/// The columns of a block of rows that are not zero everywhere.
+/// Columns of a block of rows that are nonzero somewhere.
 fn not_zero(rows: &[f64], count: usize) -> Vec<usize> {
     let mut sizes = vec![0.0; count];
     for row in rows.chunks_exact(count.max(1)) {

@@ -1,11 +1,11 @@
-//! Sums over neighbourhoods against sums over samples.
+//! Block-wise sums against sums over single samples.
 
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::rng::Seed;
 
-/// Hat functions along a line of samples, and a column that is nowhere nothing.
+/// Hat functions along a line of samples, and one dense column.
 #[test]
 fn neighbourhoods_sum_to_what_single_samples_do() {
     const SAMPLES: usize = 200;
@@ -13,7 +13,7 @@ fn neighbourhoods_sum_to_what_single_samples_do() {
     let mut rng = Seed(3).stream("rows");
     let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
     let response: Vec<f64> = (0..SAMPLES).map(|_| draw()).collect();
-    // One in five says nothing.
+    // One in five has no weight.
     let weight: Vec<f64> =
         (0..SAMPLES).map(|i| if i % 5 == 0 { 0.0 } else { draw().abs() }).collect();
     let beside: Vec<f64> = (0..SAMPLES).flat_map(|i| [1.0, i as f64 / 100.0]).collect();
@@ -24,11 +24,11 @@ fn neighbourhoods_sum_to_what_single_samples_do() {
         }
         row[NODES] = (i as f64).cos();
     };
-    // The second column beside is a chosen term's, and stays.
+    // The second column of `beside` is a chosen term's, and is kept.
     let rows = Rows::new(&response, &weight, &beside, 2, &[0.5]).expect("a level");
     let plain = rows.reduce(NODES + 1, fill);
     for side in [1, 7, SAMPLES] {
-        // The hats between the first and the last sample, and the column that is nowhere nothing.
+        // The hats between the first and the last sample, and the dense column.
         let touched = |block: usize| -> Vec<usize> {
             let node = |i: usize| i.min(SAMPLES) * (NODES - 1) / SAMPLES;
             let last = (node((block + 1) * side) + 1).min(NODES - 1);

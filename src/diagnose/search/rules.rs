@@ -1,43 +1,44 @@
-//! What a search decides by.
+//! Rules that a search decides by.
 
 use crate::diagnose::views::learnt::Learnt;
 use crate::terms::Basis;
 
-/// A later term must be this large beside the largest, root mean square by root mean square.
+/// Smallest root mean square of a later term, as a share of the largest term's.
 const MIN_OF_LARGEST: f64 = 0.06;
-/// A pattern that stands still must be, in square, so much more than what a fit to nothing but the
-/// pixels' own errors would make: seven times, for the best of many and for views that cover little
-/// of the picture.
+/// Smallest mean square of an image-fixed pattern over that of a fit to the pixels' own errors alone:
+/// seven times in amplitude, to allow for the best of many and for views that cover little of the
+/// image.
 const CLEARLY_FIXED: f64 = 50.0;
 
-/// How a search decides.
+/// Thresholds and options of a search.
 #[derive(Debug, Clone, Copy)]
 pub struct Rules {
     /// Chance that noise alone is taken for a term.
     pub level: f64,
-    /// Precision of a coefficient nothing is known about, in its own unit.
+    /// Prior precision of a coefficient, in its own unit.
     pub prior: f64,
-    /// A name must explain this share of what the best curve does.
+    /// Share of the best curve's gain that a name must reach.
     pub adequacy: f64,
-    /// And this share of what the best curve on its own axis does: what that one sees beyond is no rest
-    /// of another cause.
+    /// The same for the best curve on the name's own axis: what that curve explains beyond the name is
+    /// not left over from another cause.
     pub own_axis_adequacy: f64,
-    /// Of curves without a name, take the one on which the views agree: what stands still on the target is
-    /// no map of the picture. Where curves are fitted anew together, the largest is a better beginning.
+    /// Among nameless curves, take the one on which the views agree: a pattern fixed to the target is
+    /// no map of the image. Where curves are later refitted together, the largest gain is the better
+    /// start.
     pub agreed: bool,
     pub max_terms: usize,
-    /// Constant error of every pixel, px, and pixels of the picture: a pattern that stands still
-    /// in the picture must be larger than what these errors make by chance.
+    /// Standard deviation of the pixels' fixed errors, px, and the number of pixels covered: an
+    /// image-fixed pattern must be larger than these errors produce by chance.
     pub fixed: Option<(f64, f64)>,
-    /// Judge gains by what noise alone would have brought.
+    /// Whether gains are judged against their null distribution.
     pub calibrated: bool,
-    /// Views that the model was learnt from, where these views are not among them: its own error is
-    /// theirs scattered about their mean, and stands beside the error of these.
+    /// The views that the model was learnt from, where these are others: the model's own error is the
+    /// scatter of those views about their mean, and adds to the error of these.
     pub learnt_from: Option<Learnt>,
 }
 
 impl Rules {
-    /// Root mean square that a fit must have beside that of the `largest` term.
+    /// Smallest root mean square of a fit, given that of the `largest` term.
     pub fn min_rms(&self, basis: &Basis, largest: f64) -> f64 {
         let still = |(fixed, pixels): (f64, f64)| {
             fixed * (CLEARLY_FIXED * basis.count() as f64 / pixels).sqrt()

@@ -1,4 +1,4 @@
-//! Searches over made-up views: what is put in is found, and noise is let be.
+//! Searches of simulated views: injected terms are found, and noise is left alone.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub const RULES: Rules = Rules {
     learnt_from: None,
 };
 
-/// Places all over the picture with a free level a view; noise of unit variance, and a bias.
+/// Views with samples all over the image and a free level each; noise of unit variance, and a bias.
 pub fn session(rng: &mut Stream, bias: impl Fn(&PixelContext) -> f64) -> Vec<ViewData> {
     (0..VIEWS)
         .map(|_| {
@@ -117,7 +117,7 @@ fn what_was_put_in_is_found_with_its_size() {
     }
 }
 
-/// A curve that was taken before what really is there goes once that is; one that is there as well stays.
+/// A curve chosen before the real cause is dropped once that is in; one that is real as well stays.
 #[test]
 fn a_curve_that_brings_nothing_beside_the_others_is_left_out() {
     let both = [curve(Coordinate::Row, 479.0), curve(Coordinate::Radius, 1.0)];
@@ -126,7 +126,7 @@ fn a_curve_that_brings_nothing_beside_the_others_is_left_out() {
         let bias = |p: &PixelContext| 1.5 * p.radius * p.radius + of_rows * (p.v / 60.0).sin();
         let views = session(&mut rng, bias);
         let mut layer = Layer::of(&views, &views, &both, &RULES, Seed(11));
-        // Exponential, as of noise.
+        // Exponential, like the gains of noise.
         let gain = |k: u64| -(1.0 - (k + 1) as f64 / 601.0).ln();
         layer.noise = Some(NoiseGains::simulated(600, 0.5, gain));
         let mut chosen: Vec<Chosen> = both.iter().map(|c| layer.pin(c.clone())).collect();
@@ -136,7 +136,8 @@ fn a_curve_that_brings_nothing_beside_the_others_is_left_out() {
     }
 }
 
-/// What a pinned term can take up is nobody else's; it stays, last, and others are found beside it.
+/// What a pinned term can explain is attributed to no other; it stays, last, and others are found
+/// beside it.
 #[test]
 fn what_is_pinned_takes_up_its_own() {
     let over = Coordinate::Radius;
@@ -154,7 +155,7 @@ fn what_is_pinned_takes_up_its_own() {
         assert_eq!(families(&outcome), names);
         let last = outcome.chosen.len() - 1;
         let beta = outcome.coefficients(last);
-        // Of 1.5 r^2 from r = 1/4 to r = 3/4.
+        // Rise of 1.5 r^2 from r = 1/4 to r = 3/4.
         assert!((beta[3] - beta[1] - 0.75).abs() < 0.3, "{beta:?}");
     }
 }
@@ -176,8 +177,8 @@ fn two_causes_are_two_terms_whichever_is_larger() {
     }
 }
 
-/// Sloping boards in small patches, and in patches over which locking fades. What it brings more in
-/// the small ones is not any other candidate's that is tried on them.
+/// Sloping boards in small patches, and in patches over which locking averages out. The extra gain of
+/// locking in the small ones must not be credited to another candidate tried on them.
 #[test]
 fn what_fades_in_large_patches_is_told_once() {
     let mut rng = Seed(3).stream("search/fading");
@@ -212,8 +213,8 @@ fn what_fades_in_large_patches_is_told_once() {
     assert_eq!(families(&outcome), [Some("pixel-locking")]);
 }
 
-/// A step over the rows is no family's, and a curve along the columns that the stripes do not explain is
-/// not called stripes: each stays a curve on its own axis.
+/// No family explains a step over the rows, and stripes do not explain a hump over the columns: each
+/// stays a curve on its own axis.
 #[test]
 fn what_no_family_explains_stays_a_curve() {
     type Bias = fn(&PixelContext) -> f64;
@@ -228,8 +229,8 @@ fn what_no_family_explains_stays_a_curve() {
     }
 }
 
-/// A board that is tilted as a whole is a plane again, but for what averaging over a patch leaves:
-/// that must not be taken for a lift of metres.
+/// A tilted board is still a plane, but for what averaging over a patch leaves: that must not be taken
+/// for a lift of metres.
 #[test]
 fn a_lift_that_planes_take_up_is_none() {
     let lift = Basis::Curve {
@@ -263,7 +264,7 @@ fn a_lift_that_planes_take_up_is_none() {
         [-1.0, 0.0, 1.0].map(at).into_iter().fold(0.0, f64::max)
     };
     assert!(searched(3.0, 0.0) < 0.03, "of 3 m at the rim nothing: {}", searched(3.0, 0.0));
-    // 0.01 of the square of -1 to 1, its best line taken out.
+    // 0.01 times the square of -1 to 1, less its best line.
     let bend = searched(0.0, 0.01);
     assert!((bend / (0.01 * 2.0 / 3.0) - 1.0).abs() < 0.25, "a bent board: {bend}");
 }
@@ -271,7 +272,7 @@ fn a_lift_that_planes_take_up_is_none() {
 #[test]
 fn thresholds_and_chances_are_each_others_inverse() {
     let gains = NoiseGains::simulated(600, 0.5, |k| -(1.0 - (k + 1) as f64 / 601.0).ln());
-    // Exponential: passed with probability exp(-g).
+    // Exponential: exceeded with probability exp(-g).
     for level in [0.05, 0.01, 1e-3, 1e-5] {
         let threshold = gains.threshold(level);
         assert!((gains.p(threshold) / level - 1.0).abs() < 1e-9, "{level}");
@@ -298,7 +299,7 @@ fn a_search_repeats() {
     assert_eq!(one, run(2));
 }
 
-/// Of terms of which one cannot be fitted, wherever it stands.
+/// One of the terms cannot be fitted, wherever it stands.
 #[test]
 fn terms_that_cannot_be_fitted_are_not_told() {
     let fit = |terms: &[char]| (!terms.contains(&'c')).then_some(terms.len());

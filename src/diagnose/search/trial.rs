@@ -1,4 +1,4 @@
-//! Candidates tried beside what was chosen.
+//! Trials of candidates alongside the chosen terms.
 
 use nalgebra::DVector;
 
@@ -11,18 +11,18 @@ use super::prepared::{Patches, Prepared};
 use super::rules::Rules;
 use crate::terms::Basis;
 
-/// Candidates are tried on this.
+/// Prepared views and chosen terms that candidates are tried with.
 pub struct Trial<'a> {
     pub beside: Vec<Chosen>,
     pub views: Vec<Prepared<'a>>,
-    /// Columns of what is fitted beside.
+    /// Columns of the terms fitted alongside.
     pub settled: usize,
-    /// What those bring without the candidate, on fine and on coarse patches. `None` where a term is
-    /// pinned: it, and the names beside it, are fitted to all views, those that are left out too. Taught by
-    /// the others a free surface goes anywhere where one view reaches farther than they do, and what bends
-    /// it back would seem to be found.
+    /// Gain of those terms without the candidate, on fine and on coarse patches. `None` where a term is
+    /// pinned: it and the named terms are then fitted to all views, including the left-out ones. Fitted
+    /// to the others alone, a free surface goes astray where one view reaches farther than they do, and
+    /// a candidate that bends it back would seem to be found.
     pub base: Option<[Gain; 2]>,
-    /// Weight of all samples.
+    /// Total weight of the samples.
     pub weight: f64,
     pub rules: &'a Rules,
     /// Root mean square of the largest term so far.
@@ -34,8 +34,8 @@ impl Trial<'_> {
         Some(self.views.first()?.patches(&c.basis))
     }
 
-    /// Of the candidates with these numbers, a nest. A name that is in already is left out: what its shape
-    /// misses is left to the curves.
+    /// Judges the candidates of a nest, given by index. Families already chosen are left out: what
+    /// their shape misses is left to the curves.
     pub fn judged(&self, candidates: &[Candidate], nest: &[usize]) -> Vec<(usize, Judged)> {
         let taken = |c: &Candidate| {
             let same = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
@@ -72,7 +72,7 @@ impl Trial<'_> {
         Some(Judged { gain, null, sensible, rms })
     }
 
-    /// Root mean square of a candidate's fit over the samples, the nuisances taken out.
+    /// Root mean square of a candidate's fit over the samples, with the nuisances profiled out.
     fn rms(&self, fit: &[f64], evidence: &[Evidence]) -> f64 {
         let (m, k) = (self.settled, fit.len());
         let beta = DVector::from_column_slice(fit);
@@ -82,8 +82,8 @@ impl Trial<'_> {
     }
 }
 
-/// Candidates of which the later have the first columns of the earlier, by their numbers: evidence on the
-/// widest holds that on all.
+/// Groups candidates, by index and widest first, so that each one's columns are the first columns of
+/// those before it: evidence on the widest contains that on all.
 pub fn nests(candidates: &[Candidate]) -> Vec<Vec<usize>> {
     let mut nests: Vec<(Basis, Vec<usize>)> = Vec::new();
     for (k, c) in candidates.iter().enumerate() {
@@ -108,7 +108,8 @@ mod tests {
     use crate::rng::Seed;
     use crate::terms::{Coordinate, Modulation, PixelContext};
 
-    /// Fewer orders first and between others; of another period, or times another modulation, is another nest.
+    /// Candidates of fewer orders come before and between wider ones; another period or modulation
+    /// makes another nest.
     #[test]
     fn a_nest_has_the_first_columns_of_its_widest() {
         let (over, reference_px) = (Coordinate::RadiusSquared, 12.0);
@@ -162,7 +163,7 @@ mod tests {
         }
     }
 
-    /// Beside a name that is in already.
+    /// With a named term already chosen.
     #[test]
     fn in_a_nest_each_is_judged_as_it_is_alone() {
         let mut rng = Seed(4).stream("search/nest");

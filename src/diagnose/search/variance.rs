@@ -1,4 +1,4 @@
-//! What may change the size of the noise: candidates for the logarithm of the variance.
+//! Candidates for changes of the noise: terms of the log variance.
 
 use super::candidate::{Candidate, RECALIBRATE};
 use crate::camera::Camera;
@@ -7,10 +7,10 @@ use crate::model::SigmaModel;
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, TABLE, Term};
 
-/// The catalogue's changes of the noise, those of sigma itself, and the curves without a name.
+/// Candidates from the catalogue, changes of sigma itself, and nameless curves.
 pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
     let mut all = Candidate::of_catalogue(Statistic::Variance, bounds);
-    // Behind what follows depth or radius, in the order in which the nulls are drawn.
+    // After shapes over depth or radius; this sets the order in which the nulls are drawn.
     let first = |c: &Candidate| matches!(c.basis.axis(), Axis::Z | Axis::Radius);
     all.insert(all.partition_point(first), Candidate::named(RECALIBRATE, Basis::Level));
     all.extend(recalibrations(bounds.reach, sigma));
@@ -21,13 +21,13 @@ pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
     all
 }
 
-/// Does it say more than a sigma over depth and tilt can? What follows these two alone is the form
-/// of sigma, not physics, where sigma was fitted to the same views.
+/// Whether it says more than a sigma over depth and tilt can. Where sigma was fitted to the same views,
+/// what depends on these two alone is the form of sigma, not physics.
 pub fn beyond_sigma(candidate: &Candidate) -> bool {
     !candidate.basis.is_of_sigma()
 }
 
-/// Sigma's level and form, free.
+/// Free refit of sigma's level and form.
 pub fn refit(reach: &Extent) -> Candidate {
     surface(reach, &|l, t| {
         let u = steepness(t);
@@ -36,8 +36,8 @@ pub fn refit(reach: &Extent) -> Candidate {
     })
 }
 
-/// Free surfaces over depth and tilt, from few columns to many: what a family says that follows
-/// only these two must be said better than by all of them.
+/// Free surfaces over depth and tilt, from few columns to many. A family that depends only on these two
+/// must explain more than any of them.
 pub fn surfaces(reach: &Extent) -> Vec<Candidate> {
     vec![
         surface(reach, &|l, _| vec![1.0, l, l * l]),
@@ -51,13 +51,12 @@ pub fn surfaces(reach: &Extent) -> Vec<Candidate> {
     ]
 }
 
-/// Twice the logarithm of 1 / cos(theta): by so much log variance along the axis exceeds that
-/// across the plane.
+/// 2 ln(1 / cos(theta)): the excess of log variance along the axis over that across the plane.
 fn steepness(theta: f64) -> f64 {
     -2.0 * theta.cos().max(0.05).ln()
 }
 
-/// Columns of log depth (-1 to 1 over the reach) and tilt as a change of sigma.
+/// Change of sigma with these columns over log depth (-1 to 1 over the reach) and tilt.
 fn surface(reach: &Extent, columns: &dyn Fn(f64, f64) -> Vec<f64>) -> Candidate {
     let (z_m, theta_rad) = table_reach(reach);
     let log = z_m.map(f64::ln);
@@ -72,7 +71,7 @@ fn surface(reach: &Extent, columns: &dyn Fn(f64, f64) -> Vec<f64>) -> Candidate 
     Candidate::named(RECALIBRATE, Basis::Table { z_m, theta_rad, columns })
 }
 
-/// Where a table of sigma's changes is laid out; never empty.
+/// Depth and tilt range of a table of sigma's changes; never empty.
 fn table_reach(reach: &Extent) -> ([f64; 2], [f64; 2]) {
     let wide = |[low, high]: [f64; 2]| [low, high.max(low + 1e-3)];
     (wide(reach.z), wide(reach.theta))
@@ -84,7 +83,7 @@ fn table_place(z_m: [f64; 2], theta_rad: [f64; 2], n: usize) -> (f64, f64) {
     (at(z_m, n % TABLE), at(theta_rad, n / TABLE))
 }
 
-/// A table of the logarithm of the model's variance.
+/// Table of the model's log variance.
 fn log_variances(model: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> Vec<f64> {
     let log = |n| {
         let (z, theta) = table_place(z_m, theta_rad, n);
@@ -93,12 +92,12 @@ fn log_variances(model: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> Vec<
     (0..TABLE * TABLE).map(log).collect()
 }
 
-/// No sigma is less sure than by a factor of e in variance: a calibration whose errors are larger, or
-/// whose numbers were changed by hand, would match anything.
+/// Cap on sigma's standard error: a factor of e in variance. A calibration with larger errors, or one
+/// edited by hand, would match anything.
 const UNSURE: f64 = 1.0;
 
-/// What sigma's own covariance makes of the logarithm of the variance: a term for each of its
-/// directions, by one standard deviation.
+/// Error of the log variance by sigma's own covariance: one term per eigenvector, at one standard
+/// deviation.
 pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
     let (z_m, theta_rad) = table_reach(reach);
     let table = |model: &SigmaModel| log_variances(model, z_m, theta_rad);
@@ -111,7 +110,7 @@ pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
             model.parameters.iter_mut().zip(by.iter()).for_each(|(p, d)| *p += d);
             table(&model)
         };
-        // A hundredth of a standard deviation to either side: the slope, though sigma bends.
+        // Central difference over a hundredth of a standard deviation, as sigma is not linear.
         const SMALL: f64 = 0.01;
         let (up, down) = (moved(SMALL), moved(-SMALL));
         let slope = |(u, d): (&f64, &f64)| ((u - d) / (2.0 * SMALL)).clamp(-UNSURE, UNSURE);
@@ -125,13 +124,14 @@ pub fn error_of_sigma(reach: &Extent, sigma: &SigmaModel) -> Vec<Vec<Term>> {
     (0..eigen.eigenvalues.len()).filter_map(direction).collect()
 }
 
-/// Does the logarithm of the variance move with it?
+/// Whether the log variance changes noticeably with it.
 fn tells(column: &[f64]) -> bool {
     column.iter().all(|c| c.is_finite()) && column.iter().any(|c| c.abs() > 0.05)
 }
 
-/// The derivatives of log variance after the sigma model's parameters: all of them, those that a frontal
-/// target decides, and each alone; and what [`moved_depths`] make of it.
+/// Derivatives of log variance with respect to the sigma model's parameters: all of them, those that a
+/// frontal target determines, and each alone. Also large changes of the level parameters, and
+/// [`moved_depths`].
 fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
     let (z_m, theta_rad) = table_reach(reach);
     let table = |model: &SigmaModel| log_variances(model, z_m, theta_rad);
@@ -139,7 +139,7 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
     let columns: Vec<Vec<f64>> = (0..sigma.parameters.len())
         .filter_map(|j| {
             let mut moved = sigma.clone();
-            // A hundredth of the parameter.
+            // One per cent of the parameter.
             let step = 0.01 * sigma.parameters[j].abs().max(1e-9);
             moved.parameters[j] += step;
             let column: Vec<f64> =
@@ -148,7 +148,7 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         })
         .collect();
     let few = columns.len().min(3);
-    // A change that is not small bends: the level parameters by a third up and down.
+    // Large changes are not linear: the level parameters by about a third up and down.
     let bent: Vec<Vec<f64>> = (0..few)
         .flat_map(|j| [0.7, 1.4].map(|factor| (j, factor)))
         .filter_map(|(j, factor)| {
@@ -158,7 +158,7 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
             column.iter().all(|c| c.is_finite()).then_some(column)
         })
         .collect();
-    // One number that is off is no less simple than a formula of one.
+    // A single wrong parameter is as simple as a formula of one.
     let moved = moved_depths(sigma, z_m, theta_rad);
     let alone = columns.iter().cloned().chain(moved).map(|column| vec![column]);
     let level = (few < columns.len()).then(|| columns[..few].to_vec());
@@ -172,28 +172,28 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         .collect()
 }
 
-/// What a scale of the depth, z' = (1 + s) z, and an offset of the disparity, z' = z + c z^2, make of the
-/// logarithm of the variance over the model's at z', per s and per c: planes do not show these, and the
-/// noise that moves with them is no new physics. To first order, and as if the tilts stayed.
+/// Change of log variance over the model's at z', due to a depth scale, z' = (1 + s) z, and a disparity
+/// offset, z' = z + c z^2, per s and per c. Planes do not show these, and noise that moves with them is
+/// no new physics. To first order, with the tilts unchanged.
 fn moved_depths(sigma: &SigmaModel, z_m: [f64; 2], theta_rad: [f64; 2]) -> Vec<Vec<f64>> {
     const SMALL: f64 = 0.01;
     let column = |of: &dyn Fn(f64, f64) -> f64| {
         let at = |n| {
             let (z, theta) = table_place(z_m, theta_rad, n);
             let log = |z| 2.0 * sigma.sigma(z, theta).ln();
-            // Towards the middle: beyond its ends a sigma goes on as it ended.
+            // Step towards the middle: beyond its ends a sigma continues as it ended.
             let share = if z * z > z_m[0] * z_m[1] { 1.0 - SMALL } else { 1.0 + SMALL };
             of(z, (log(z * share) - log(z)) / share.ln())
         };
         (0..TABLE * TABLE).map(at).collect::<Vec<f64>>()
     };
     let mut columns = vec![column(&|_, slope| 2.0 - slope), column(&|z, slope| z * (4.0 - slope))];
-    // Sigma in proportion to z does not move with a scale, nor to z^2 with an offset.
+    // A sigma proportional to z is unaffected by a scale, one proportional to z^2 by an offset.
     columns.retain(|c| tells(c));
     columns
 }
 
-/// Curves without a name, one axis each.
+/// Nameless curves over one axis, and maps over two.
 fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     let (width, height) = (camera.width as f64, camera.height as f64);
     let curve = |over, [low, high]: [f64; 2], nodes| {
@@ -239,7 +239,7 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
     all
 }
 
-/// Noisier, or less so, from a time of the session on: a curve through few nodes follows no step.
+/// Steps of the noise at a time of the session; a curve with few nodes cannot follow one.
 fn onsets([start, end]: [f64; 2]) -> impl Iterator<Item = Candidate> {
     const PLACES: usize = 8;
     let wide = (end - start) / PLACES as f64;

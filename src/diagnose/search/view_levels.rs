@@ -1,4 +1,4 @@
-//! How much the views' own levels of noise differ for no reason.
+//! Unexplained scatter of the views' own noise levels.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
@@ -8,18 +8,18 @@ use crate::solve::{Left, fit_by_svd, left_by_fit};
 use crate::stats::{median, range};
 use crate::terms::{PixelContext, ROOM_LUX};
 
-/// A model's sigma is not known better than this from view to view, in log variance, where the views
-/// are too few to show how they scatter.
+/// Assumed standard deviation of a model's sigma from view to view, in log variance, where too few
+/// views show how they scatter.
 pub const MODEL_TOLERANCE: f64 = 0.04;
 
-/// Variance of the views' own levels beyond what their samples explain (a moment estimate after
-/// DerSimonian and Laird), about laws of the distance, from nine views on of the tilt, from ten on
-/// of the time and the temperature instead, from twelve on of all, the room's light too: what a law
-/// explains is no scatter. Enlarged for the laws that so few views have to settle.
+/// Variance of the views' own levels beyond sampling (a moment estimate after DerSimonian and Laird),
+/// about laws that explain part of it: the distance; from nine views on the tilt; from ten on
+/// alternatively time and temperature; from twelve on all of these and ambient light. Enlarged for the
+/// laws that so few views have to determine.
 pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     let levels = Level::of(blocks);
     let choices: &[&[Law]] = match levels.len() {
-        // By how much two runs differ by chance may follow any law of the distance.
+        // The chance difference of two runs may follow any law of the distance.
         _ if tolerance > MODEL_TOLERANCE => &[&LAWS[..1]],
         12.. => &[&LAWS],
         10.. => &[&LAWS[..4], &[Law::Level, Law::Distance, Law::Time, Law::Warmth]],
@@ -31,7 +31,7 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
         if levels.len() < among.len() + 2 {
             return None;
         }
-        // Views of one distance or one tilt leave laws without a meaning.
+        // Views of one distance or one tilt make laws collinear.
         let Left { squares, free } = left_by_fit(&laws(&levels, among), &heights(&levels))?;
         let enlarged = if free > 3.0 { free / (free - 2.0) } else { 3.0 };
         let floor =
@@ -43,11 +43,11 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
     scatters.min_by(f64::total_cmp).map_or(floor, |scatter| chosen * scatter)
 }
 
-/// The smaller of two fits to ten or eleven levels is too small by this (1.19 and 1.15, simulated).
+/// Correction for taking the smaller of two fits to ten or eleven levels (1.19 and 1.15, simulated).
 const CHOSEN: f64 = 1.2;
 
-/// The same where a third of the views may have a level of their own: least trimmed squares
-/// (Rousseeuw 1984) about a law of the distance, and never more than `whole`, the scatter of all views.
+/// The same where up to a third of the views may have a level of their own: least trimmed squares
+/// (Rousseeuw 1984) about a law of the distance. Never more than `whole`, the scatter of all views.
 pub fn scatter_of_most(blocks: &[ViewData], whole: f64) -> f64 {
     let levels = Level::of(blocks);
     let kept = levels.len() - levels.len() / 3;
@@ -60,18 +60,19 @@ pub fn scatter_of_most(blocks: &[ViewData], whole: f64) -> f64 {
     let starts = [Some(y.map(|y| y - middle)), left_by(&x, &y, &(0..y.len()).collect::<Vec<_>>())];
     let trimmed = starts.into_iter().flatten().filter_map(|start| trimmed(&x, &y, start, kept));
     let Some(squares) = trimmed.min_by(f64::total_cmp) else { return whole };
-    // Of a normal law's variance, what its middle part holds.
+    // Variance of a standard normal truncated to its middle `part`.
     let (normal, part) = (Normal::standard(), kept as f64 / levels.len() as f64);
     let end = normal.inverse_cdf(0.5 + 0.5 * part);
     let held = 1.0 - 2.0 * end * normal.pdf(end) / part;
     let free = (kept - among.len()) as f64;
-    // So that one in a hundred is too small by no more than view_scatter is (simulated, 10 to 40 views).
+    // Chosen so that its lowest 1 % is too small by no more than that of view_scatter (simulated, 10 to
+    // 40 views).
     let enlarged = 1.0 + 12.0 / free;
     let scatter = (squares / held / free - sampling(&levels)) * enlarged;
     scatter.max(unseen(&levels, free) * enlarged).min(whole)
 }
 
-/// A view's level, and its variance by sampling alone.
+/// A view's noise level, and its sampling variance.
 struct Level<'a> {
     place: &'a PixelContext,
     height: f64,
@@ -88,7 +89,7 @@ impl<'a> Level<'a> {
     }
 }
 
-/// What a view's level of noise may follow.
+/// Laws that a view's noise level may follow.
 #[derive(Clone, Copy)]
 enum Law {
     Level,
@@ -98,7 +99,7 @@ enum Law {
     Turn,
     Time,
     Warmth,
-    /// The light of the room over the pattern's, which falls with the square of the distance.
+    /// Ambient light over the pattern's, which falls with the square of the distance.
     Ambient,
 }
 
@@ -121,7 +122,7 @@ impl Law {
 }
 
 fn laws(levels: &[Level<'_>], among: &[Law]) -> DMatrix<f64> {
-    // In one light for all views a law of the light is one of the distance.
+    // With the same light in all views, a law of the light is one of the distance.
     let [dim, bright] = range(levels.iter().map(|l| l.place.ambient));
     let at = |law: Law, place: &PixelContext| match law {
         Law::Ambient if bright <= dim => 0.0,
@@ -138,18 +139,18 @@ fn sampling(levels: &[Level<'_>]) -> f64 {
     levels.iter().map(|l| l.variance).sum::<f64>() / levels.len() as f64
 }
 
-/// The scatter that levels which do not scatter can hide: one standard error of its estimate.
+/// Scatter that sampling can hide where there is none: one standard error of its estimate.
 fn unseen(levels: &[Level<'_>], free: f64) -> f64 {
     sampling(levels) * (2.0 / free).sqrt()
 }
 
-/// What a fit to some of the rows leaves of all.
+/// Residuals of all rows about a fit to some of them.
 fn left_by(x: &DMatrix<f64>, y: &DVector<f64>, rows: &[usize]) -> Option<DVector<f64>> {
     let (beta, _) = fit_by_svd(&x.select_rows(rows), &y.select_rows(rows))?;
     Some(y - x * beta)
 }
 
-/// Sum of the smallest `kept` squares about a fit to those rows alone.
+/// Sum of the `kept` smallest squared residuals about a fit to those rows alone.
 fn trimmed(x: &DMatrix<f64>, y: &DVector<f64>, start: DVector<f64>, kept: usize) -> Option<f64> {
     const MAX_STEPS: usize = 20;
     let mut left = start;
@@ -178,8 +179,8 @@ mod tests {
     use super::*;
     use crate::rng::{Seed, Stream};
 
-    /// A session whose levels follow a law of the distance, scatter by `sd`, and in `odd` views are
-    /// up by `more`.
+    /// A session whose levels follow a law of the distance, scatter by `sd`, and are raised by `more`
+    /// in `odd` views.
     fn session(views: usize, sd: f64, odd: usize, more: f64, rng: &mut Stream) -> Vec<ViewData> {
         let view = |n: usize| {
             let z = rng.random_range(0.8..3.3);
@@ -209,7 +210,7 @@ mod tests {
         }
     }
 
-    /// One in a hundred may be as small as the true one by four.
+    /// One in a hundred may be as small as a quarter of the true one.
     #[test]
     fn levels_that_all_scatter_are_not_believed_steadier() {
         let mut rng = Seed(4).stream("levels");
@@ -222,7 +223,8 @@ mod tests {
         }
     }
 
-    /// Levels that differ by sampling alone may hide one standard error of that, whatever the picture's size.
+    /// Levels that differ by sampling alone may hide a scatter of one standard error, whatever the
+    /// image size.
     #[test]
     fn the_scatter_that_is_not_seen_goes_with_what_a_view_is_worth() {
         let mut rng = Seed(6).stream("levels");
@@ -242,7 +244,8 @@ mod tests {
         }
     }
 
-    /// What follows the light of the room is no scatter where the views' light differs; in one light it is.
+    /// A dependence on ambient light is no scatter where the views' light differs; in constant light it
+    /// is.
     #[test]
     fn the_light_of_the_room_is_a_law_where_it_differs() {
         let mut rng = Seed(8).stream("levels");
@@ -259,7 +262,7 @@ mod tests {
         assert!(differs < 0.04 && same > 0.06, "{differs} {same}");
     }
 
-    /// With a trend of `rise` over a session whose views were taken at random distances.
+    /// Adds a trend of `rise` over a session whose views were taken at random times.
     fn with_trend(mut views: Vec<ViewData>, rise: f64, rng: &mut Stream) -> Vec<ViewData> {
         for view in &mut views {
             let session_s = rng.random_range(0.0..1800.0);

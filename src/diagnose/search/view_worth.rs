@@ -1,8 +1,8 @@
-//! How much a view's mean is worth where it seems to err more, or more alike, than the others' do.
+//! Weight of a view's mean where its error seems larger, or more correlated, than the others'.
 //!
-//! A cause that only some views have makes their errors alike from patch to patch, as noise that hangs
-//! together would: by its own measure such a view is worth little. It is given the worth of the others,
-//! and each candidate answers for what it leaves.
+//! A cause that only some views have correlates their errors from patch to patch, as correlated noise
+//! would, so by its own measure such a view has little weight. It gets the weight of the others
+//! instead, and each candidate is penalised for what it leaves.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +14,21 @@ use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::stats::quantile;
 use crate::terms::{Basis, Term};
 
-/// A view worth so many times less than the others may have a cause of its own. In the ray-traced session
-/// that this was read off, the eight views without one were within two fifths of their middle.
+/// A view whose inflation is this many times the usual one may have a cause of its own. In the
+/// ray-traced session this was read off, the eight views without one were within two fifths of their
+/// median.
 const OTHERWISE: f64 = 2.0;
-/// The quantile of the views that shows what is usual: the middle of those without a cause where nearly half
-/// have one.
+/// Quantile of the views that shows the usual inflation: the median of those without a cause where
+/// nearly half have one.
 const USUAL: f64 = 0.25;
-/// Fewer patches say nothing of what is left.
+/// Minimum degrees of freedom; fewer patches say nothing of what is left.
 const MIN_FREE: f64 = 8.0;
-/// A patch of less than this share of the largest weight is left out.
+/// Patches below this share of the largest weight are left out.
 const SLIGHT: f64 = 1e-6;
 
-/// How many times surer each view's mean is if its noise is as it usually is than by its own measure,
-/// which takes a cause that the others do not have for noise; 1 where they agree. Noise that the view's
-/// frames show is no such cause, nor are rows that err as one in each of them.
+/// Factor on the weight of each view's mean for noise of the usual size, instead of its own measure,
+/// which takes a cause that the others do not have for noise; 1 where the two agree. Noise that differs
+/// between the view's frames is no such cause, nor are correlated errors of each frame's rows.
 pub fn doubted(survey: &Survey) -> Vec<f64> {
     let of_noise = |v: &SurveyedView| {
         let of_rows = v.row_correlation.min(v.correlation.sum);
@@ -38,16 +39,16 @@ pub fn doubted(survey: &Survey) -> Vec<f64> {
 }
 
 fn doubts(inflations: &[f64]) -> Vec<f64> {
-    // A view that shows nothing says nothing of the others.
+    // A view without data says nothing about the others.
     let mut shown: Vec<f64> = inflations.iter().copied().filter(|i| i.is_finite()).collect();
     let usual = quantile(&mut shown, USUAL).unwrap_or(f64::INFINITY);
     let doubt = |i: &f64| if i.is_finite() { (i / (OTHERWISE * usual)).max(1.0) } else { 1.0 };
     inflations.iter().map(doubt).collect()
 }
 
-/// What a candidate leaves of a view over what the weights allow: the worst of patches of one, two, four
-/// and eight samples across, so that errors which hang together count as they do. Infinite where too few
-/// patches of any size are seen.
+/// Reduced chi squared of what a candidate leaves of a view: the largest over patches of one, two, four
+/// and eight samples across, so that correlated errors count in full. Infinite where too few patches of
+/// any size are seen.
 pub fn left_over(view: &ViewData, basis: &Basis, beta: &[f64]) -> f64 {
     let left = view.without(&[Term::bias(basis.clone(), beta.to_vec())]);
     let Some(plane) = view.plane_of(&left) else { return f64::INFINITY };
@@ -59,7 +60,7 @@ pub fn left_over(view: &ViewData, basis: &Basis, beta: &[f64]) -> f64 {
             sums[0] += w * (y - plane.dot(&Vector3::new(1.0, p.x, p.y)));
             sums[1] += w;
         }
-        // What weighs next to nothing leaves nothing, and is no evidence of a good fit.
+        // Patches of negligible weight leave nothing, which is no evidence of a good fit.
         let most = patches.values().map(|p| p[1]).fold(0.0, f64::max);
         patches.retain(|_, p| p[1] > SLIGHT * most);
         let free = patches.len() as f64 - 3.0 - beta.len() as f64;
@@ -83,7 +84,7 @@ mod tests {
     const ACROSS: usize = 32;
     const SIDE: f64 = 4.0;
 
-    /// A view of unit noise with this error in it.
+    /// A view of unit noise with this error added.
     fn view(error: impl Fn(f64, f64) -> f64) -> ViewData {
         let mut rng = Seed(1).stream("worth");
         let mut data = ViewData::default();
@@ -106,7 +107,7 @@ mod tests {
         data
     }
 
-    /// Views of the second half of a session, of which one shows nothing.
+    /// Inflations of a session with a cause in its last three views; one view has no data.
     #[test]
     fn what_begins_late_is_doubted_where_it_began() {
         let views = [12.0, 14.0, 10.0, 13.0, f64::INFINITY, 110.0, 90.0, 200.0];
@@ -116,7 +117,8 @@ mod tests {
         assert_eq!(doubts(&[f64::INFINITY; 2]), [1.0; 2]);
     }
 
-    /// What a candidate explains leaves noise; what it does not counts as far as it hangs together.
+    /// What a candidate explains leaves noise; what it does not explain counts as far as it is
+    /// correlated.
     #[test]
     fn what_a_candidate_leaves_counts_against_it() {
         let bowl = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::One);

@@ -1,8 +1,9 @@
-//! Coarse steps: lattices that every word reaches, as wide as it is, which tells a step from its own fractions.
+//! Coarse steps: lattices that pass every occurring raw word within its width, which tells a step from its
+//! fractions.
 
 use super::comb::{CHANCE, COARSE, GATHERED, Gathered, PHASE_STEP, STRAY};
 
-/// Where the readings of a word lie, how wide it is, and the root of their count.
+/// A raw word: where its readings lie, its width, and the root of their count.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
     pub at: f64,
@@ -16,11 +17,11 @@ struct Lattice {
     from: f64,
 }
 
-/// What is left out of a fit beside a word's own width, in steps, round by round: a scan is off by half of
+/// Tolerance of a fit beyond a word's own width, in steps, round by round. The scan is off by half of
 /// [`PHASE_STEP`] at the ends.
 const LEFT_OUT: [f64; 4] = [0.15, 0.05, 0.015, 0.0];
-/// A word reaches half of its width to each side, and a lattice fitted to five words, rounded by 0.29 of a width,
-/// is off by up to a quarter.
+/// A word reaches half of its width to each side, and a lattice fitted to five words, rounded by 0.29 of a
+/// width, is off by up to a quarter.
 const REACH: f64 = 0.75;
 
 impl Lattice {
@@ -36,7 +37,7 @@ impl Lattice {
         self.off(place.at) <= REACH * place.width + more * self.size
     }
 
-    /// Of about this step, by least squares on more and more of the places that are near.
+    /// Least-squares fit of about this step to the near places, with a tolerance that narrows in rounds.
     fn fit(places: &[Place], size: f64) -> Option<Self> {
         let on: Vec<(f64, f64)> = places.iter().map(|p| (p.at, p.weight)).collect();
         let from = size * Gathered::of(&on, 1.0 / size).phase;
@@ -58,8 +59,8 @@ impl Lattice {
         LEFT_OUT.iter().fold(Some(Lattice { size, from }), refine)
     }
 
-    /// The words that it explains, in order, or `None` where too many readings lie in others. A step's readings
-    /// all have one word: beside a word that is there its neighbour ought to be empty.
+    /// Words on the lattice, in order; `None` where too many readings lie in others. All readings of a step
+    /// are in one word, so a word's neighbour should be empty.
     fn explains(&self, places: &[Place]) -> Option<Vec<Place>> {
         let mut on: Vec<Place> = Vec::new();
         for place in places.iter().filter(|p| self.is_near(p, 0.0)) {
@@ -73,7 +74,7 @@ impl Lattice {
         (weight(&on) >= (1.0 - STRAY) * weight(places)).then_some(on)
     }
 
-    /// Chance that words anywhere would lie as these do: the two finest settle the lattice.
+    /// Probability that words placed anywhere would fit as well; the two finest determine the lattice.
     fn chance(&self, on: &[Place]) -> f64 {
         let mut widths: Vec<f64> = on.iter().map(|p| p.width).collect();
         widths.sort_by(f64::total_cmp);
@@ -82,14 +83,14 @@ impl Lattice {
     }
 }
 
-/// The coarsest step between `coarsest` and `finest` on which the places lie, in order, and the chance of it.
+/// Coarsest step between `coarsest` and `finest` that fits the places, which are in order, and its p-value.
 pub fn coarsest_step(places: &[Place], [coarsest, finest]: [f64; 2]) -> Option<(f64, f64)> {
     let range = places.last()?.at - places.first()?.at;
     let by = PHASE_STEP / range.abs().max(finest);
     let frequency = |scanned: usize| 1.0 / coarsest + scanned as f64 * by;
     let mut scan = (0..).map(|n| (n, 1.0 / frequency(n))).take_while(|(_, size)| *size > finest);
     let told = |(scanned, size): (usize, f64)| {
-        // Wider words cannot show it.
+        // Wider words cannot show this step.
         let fine: Vec<Place> = places.iter().filter(|p| p.width < COARSE * size).copied().collect();
         let at: Vec<(f64, f64)> = fine.iter().map(|p| (p.at, p.weight)).collect();
         if Gathered::of(&at, 1.0 / size).resultant < GATHERED {
@@ -107,7 +108,7 @@ pub fn coarsest_step(places: &[Place], [coarsest, finest]: [f64; 2]) -> Option<(
 mod tests {
     use super::*;
 
-    /// Words of 0.2 mm at these disparities, of a camera with 43.5 px m.
+    /// Words of 0.2 mm at these disparities, for a camera with 43.5 px m.
     fn places(disparities: impl Iterator<Item = f64>) -> Vec<Place> {
         let px_words = 43.5 * 5000.0;
         let place = |d: f64| {

@@ -1,24 +1,24 @@
-//! Combs: whether the words that occur lie at even distances, by how far their phases gather.
+//! Combs: whether the raw words that occur are evenly spaced, by how much their phases concentrate.
 
 use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-/// Phases gathered more than this belong to a lattice: chance over the scanned frequencies and a
-/// hundred words reaches 0.4.
+/// Resultant length above which phases show a lattice; chance over the scanned frequencies and a hundred
+/// words reaches 0.4.
 pub const GATHERED: f64 = 0.6;
 /// Words wider than this share of a step cannot show it.
 pub const COARSE: f64 = 0.35;
-/// Finest and coarsest steps of the depth looked for, in units of the words: two are gathered by
+/// Finest and coarsest steps of the depth that are tried, in raw units. At two units the resultant length is
 /// sin(pi / 2) / (pi / 2), just above [`GATHERED`].
 pub const STEPS_UNITS: [f64; 2] = [2.0, 500.0];
-/// The range of words in which they are looked for first.
+/// Range of words in which they are tried first.
 const DENSE_UNITS: f64 = 1024.0;
-/// Coarsest and finest steps looked for by their phases alone, px: coarser ones gather readings that only
-/// have a few distances.
+/// Coarsest and finest steps of the disparity that are tried by phases alone, px; coarser ones also fit
+/// readings at only a few distances.
 pub const STEPS_PX: [f64; 2] = [1.0 / 3.0, 1.0 / 64.0];
 
-/// How much the phases of places gather, 0 to 1, and how many equal places their weights are worth.
+/// Resultant length of the phases of places, 0 to 1, and the effective number of places.
 pub struct Gathered {
     pub resultant: f64,
     /// Mean phase, cycles.
@@ -27,7 +27,7 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    /// Of places with their weights; nothing of none.
+    /// Phases of weighted places at a frequency; zero without any.
     pub fn of(places: &[(f64, f64)], frequency: f64) -> Self {
         let (mut c, mut s, mut n, mut squares) = (0.0, 0.0, 0.0, 0.0);
         for &(x, weight) in places {
@@ -42,7 +42,7 @@ impl Gathered {
     }
 }
 
-/// The frequency at which phases gather most, how much they do (0 to 1), and the chance of it.
+/// Frequency at which the phases concentrate most, their resultant length (0 to 1), and its p-value.
 #[derive(Default)]
 pub struct Comb {
     frequency: f64,
@@ -51,12 +51,12 @@ pub struct Comb {
 }
 
 impl Comb {
-    /// Of a lattice, if it is one.
+    /// Step of the lattice, if it is one.
     pub fn step(&self) -> Option<f64> {
         (self.resultant > GATHERED).then(|| 1.0 / self.frequency)
     }
 
-    /// Of the places, with their weights, that `at` gives for each frequency of an even scan.
+    /// Scans frequencies evenly; `at` gives the weighted places for each of them.
     fn scan<'a>(from: f64, to: f64, by: f64, at: &dyn Fn(f64) -> &'a [(f64, f64)]) -> Self {
         let mut best = Comb::default();
         let (mut worth, mut scanned) = (0.0, 0.0);
@@ -70,24 +70,24 @@ impl Comb {
             scanned += 1.0;
             frequency += by;
         }
-        // Rayleigh's test, at each of the scanned frequencies.
+        // Rayleigh test, corrected for the number of scanned frequencies.
         let chance: f64 = scanned * (-worth * best.resultant * best.resultant).exp();
         Comb { p: chance.clamp(f64::MIN_POSITIVE, 1.0), ..best }
     }
 }
 
-/// A scan goes on by this share of a cycle over the range of what it looks at.
+/// Scan increment, in cycles over the range of the places.
 pub const PHASE_STEP: f64 = 0.15;
 
-/// Steps of the disparity, px: words are `px_words` over their disparity.
+/// Finds steps of the disparity, px; a word's disparity is `px_words` over the word.
 pub fn steps_of_disparities(words: &[(usize, f64)], px_words: f64) -> Comb {
     let disparities: Vec<(f64, f64)> = words
         .iter()
-        // A count counts less and less: a lattice shows in which words occur.
+        // The square root damps the counts: a lattice shows in which words occur.
         .map(|&(w, n)| (px_words / w as f64, n.sqrt()))
         .collect();
     let range = disparities[0].0 - disparities[disparities.len() - 1].0;
-    // Words coarser than the lattice, the nearest ones, cannot show it.
+    // The nearest words are coarser than the lattice and cannot show it.
     let fine = |frequency: f64| {
         let coarse = |&(w, _): &(usize, f64)| px_words / (w * w) as f64 * frequency >= COARSE;
         &disparities[words.partition_point(coarse)..]
@@ -95,8 +95,8 @@ pub fn steps_of_disparities(words: &[(usize, f64)], px_words: f64) -> Comb {
     Comb::scan(1.0 / STEPS_PX[0], 1.0 / STEPS_PX[1], PHASE_STEP / range.max(1.0), &fine)
 }
 
-/// Steps of the depth that are no whole number of units: where words lie densest first, then finer and
-/// finer over more of them.
+/// Finds steps of the depth that are no whole number of units: first where words are densest, then more and
+/// more finely over more of them.
 pub fn steps_of_depths(words: &[(usize, f64)]) -> Comb {
     let places: Vec<(f64, f64)> = words.iter().map(|&(w, n)| (w as f64, n.sqrt())).collect();
     let within = |middle: f64, range: f64| {
@@ -124,20 +124,20 @@ pub fn steps_of_depths(words: &[(usize, f64)]) -> Comb {
     Comb { p: p.clamp(f64::MIN_POSITIVE, 1.0), ..comb }
 }
 
-/// Finest and coarsest steps looked for in raw words, in words: of a finer one only every eighth word or
-/// fewer would be empty.
+/// Finest and coarsest steps tried in raw words, in words; a finer step leaves only every eighth word or
+/// fewer empty.
 const STEPS_WORDS: [f64; 2] = [1.15, 16.0];
-/// So many words in the middle of those that occur are enough; a scan goes on by this share of a step over
+/// Words scanned, in the middle of those that occur. The scan goes on by `WORD_PHASE_STEP` of a step over
 /// their range.
 const WORDS_SCANNED: usize = 256;
 const WORD_PHASE_STEP: f64 = 0.04;
-/// Share of the readings, by the roots of their counts, that may lie in words that ought to be empty.
+/// Share of the readings, by the square roots of their counts, that may lie in words that should be empty.
 pub const STRAY: f64 = 0.05;
-/// Steps whose chance is larger are not told.
+/// Largest p-value of a step that is reported.
 pub const CHANCE: f64 = 1e-4;
 
-/// Steps of a matcher whose answers are stored in the nearest words, which leaves words between them
-/// empty: the coarsest that explains which are, in words, and the chance of it were all as likely.
+/// Steps of a matcher whose answers are stored in the nearest words, which leaves words between them empty:
+/// the coarsest that explains which, in words, and its p-value if all were equally likely.
 pub fn steps_of_words(words: &[(usize, f64)]) -> Option<(f64, f64)> {
     let middle = words[words.len() / 2].0;
     let near = words.iter().filter(|w| w.0.abs_diff(middle) <= WORDS_SCANNED / 2);
@@ -149,14 +149,14 @@ pub fn steps_of_words(words: &[(usize, f64)]) -> Option<(f64, f64)> {
     let first = (0..tries).into_par_iter().find_first(holds)?;
     let last = (first..tries).take_while(holds).last()?;
     let frequency = 0.5 * (scan(first) + scan(last));
-    // Each word has this chance to lie within the arc that one of them begins.
+    // Probability of each word to lie within the arc that begins at one of them.
     let n = near.len() as f64;
     let p = (n * tries as f64 * frequency.powf(n - 1.0)).max(f64::MIN_POSITIVE);
     (p < CHANCE).then_some((frequency.recip(), p))
 }
 
-/// The greatest share of the places' weights whose phases an arc holds that is not quite as long as a word:
-/// of evenly spread phases a whole one holds one too many.
+/// Largest share of the weights whose phases fit in an arc slightly shorter than a word; one as long as a
+/// word would hold one evenly spaced phase too many.
 fn max_within(places: &[(f64, f64)], frequency: f64) -> f64 {
     let arc = frequency * (1.0 - 0.5 * WORD_PHASE_STEP);
     let mut phases: Vec<(f64, f64)> =

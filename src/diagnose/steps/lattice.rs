@@ -1,4 +1,4 @@
-//! Which depths occur at all: the steps of the matcher, and those of the driver.
+//! Lattices of the depths that occur: the steps of the matcher, and those of the driver.
 
 use super::coarse::{Place, coarsest_step};
 use super::comb::{
@@ -8,7 +8,7 @@ use super::comb::{
 use crate::frame::DepthCode;
 use crate::view::Sensor;
 
-/// How often each stored word occurs on the targets.
+/// Number of times each raw word occurs on the targets.
 #[derive(Debug, Clone)]
 pub struct RawHistogram(pub Vec<u32>);
 
@@ -22,33 +22,33 @@ impl Default for RawHistogram {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     pub size: f64,
-    /// Chance of it were all words as likely to occur; `None` where the format has the steps.
+    /// P-value if all words were equally likely to occur; `None` where the format itself has the steps.
     pub p: Option<f64>,
 }
 
 /// Steps that were found.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Quantisation {
-    /// All words are multiples of so many units: depth in metres a step.
+    /// Depth step, m: all words are multiples of so many units.
     pub depth: Option<Step>,
-    /// Occurring disparities are multiples of this, px, give or take a constant.
+    /// Disparity step, px: occurring disparities are multiples of it, plus a constant.
     pub disparity: Option<Step>,
 }
 
-/// Fewer distinct words than this make no lattice that phases show.
+/// Fewest distinct words for phases to show a lattice.
 const MIN_WORDS: usize = 12;
-/// And than this none at all: two settle it, and chance is to be ruled out by three at least.
+/// Fewest distinct words for any lattice: two determine it, and at least three must rule out chance.
 const MIN_FEW: usize = 5;
-/// Neighbouring words that alternate between crowded and empty by this share.
+/// Least contrast between neighbouring words, crowded or empty, that suggests a lattice.
 const CONTRAST: f64 = 0.4;
-/// Phases gathered less than this belong to none: a dozen words by chance gather so much.
+/// Resultant length below which phases fit no lattice; a dozen random words reach it.
 const GATHERED_AT_ALL: f64 = 0.4;
-/// What a scale of the depth, or the error of a step, may change it by, as a share.
+/// Largest relative change of a step by a scale of the depth or by its own error.
 const STEP_ERROR: f64 = 0.02;
-/// Coarsest step of the disparity looked for, px: matchers answer in whole pixels at the coarsest, of pictures
-/// that may be an eighth as wide as the one stored.
+/// Coarsest step of the disparity that is tried, px. Matchers answer in whole pixels at the coarsest, of
+/// pictures that may be an eighth as wide as the stored one.
 const COARSEST_PX: f64 = 8.0;
-/// A step of which a comb is a fraction is twice as coarse at least.
+/// A step of which a comb is a fraction is at least twice as coarse.
 const COARSER: f64 = 1.5;
 
 impl Quantisation {
@@ -56,7 +56,7 @@ impl Quantisation {
         self.depth.is_some() || self.disparity.is_some()
     }
 
-    /// The coarser step at this depth, px.
+    /// Coarser of the two steps at this depth, px.
     pub fn step_px(&self, scale_px_m: f64, z: f64) -> f64 {
         let depth = self.depth.map_or(0.0, |step| step.size * scale_px_m / (z * z));
         self.disparity.map_or(0.0, |step| step.size).max(depth)
@@ -77,23 +77,23 @@ impl RawHistogram {
             .collect()
     }
 
-    /// Of the words of a picture.
+    /// Counts the words of a picture.
     pub fn count(&mut self, words: impl Iterator<Item = u16>) {
         words.for_each(|w| self.0[usize::from(w)] += 1);
     }
 
-    /// Are there too few words for a lattice to show by how often each occurs?
+    /// Whether there are too few distinct words for their counts to show a lattice.
     pub fn is_few(&self) -> bool {
         self.0.iter().filter(|n| **n > 0).take(MIN_WORDS).count() < MIN_WORDS
     }
 
-    /// The lattice the words lie on.
+    /// Returns the lattice that the words lie on.
     pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Quantisation {
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
                 self.of_depths(units_per_metre, scale_px_m)
             }
-            // Words are the lattice; what is left to see is whether a coarser one leaves some empty.
+            // The words are a lattice; a coarser one leaves some of them empty.
             DepthCode::Disparity { slope, .. } => self.of_raw_words(slope.abs() * scale_px_m),
         }
     }
@@ -111,7 +111,7 @@ impl RawHistogram {
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         let by_chance = all_multiples(stride, words.len());
         let few = words.len() < MIN_WORDS;
-        // A handful of round distances is no step.
+        // A handful of round distances is not a step.
         let by_few =
             words.len() >= MIN_FEW && by_chance < CHANCE && stride <= STEPS_UNITS[1] as usize;
         if stride > 1 && (!few || by_few) {
@@ -133,7 +133,7 @@ impl RawHistogram {
             };
             words.iter().map(place).collect()
         };
-        // A comb tells a step or a fraction of it.
+        // A comb shows a step, or a fraction of it.
         let finest_px = disparity.step().map_or(STEPS_PX[0], |step| COARSER * step);
         let in_px = places(&|w| [px_words / w, px_words / (w * w)]);
         let coarse_px = coarsest_step(&in_px, [COARSEST_PX, finest_px]);
@@ -173,8 +173,8 @@ impl RawHistogram {
         Quantisation { depth: None, disparity }
     }
 
-    /// Do the disparities lie on a lattice of this step, give or take what a scale or its own error
-    /// makes of it? `None` where too few words could show it.
+    /// Whether the disparities lie on a lattice of this step, allowing for a scale or the step's own error.
+    /// `None` where too few words could show it.
     pub fn on_disparities(&self, step: f64, sensor: &Sensor, scale_px_m: f64) -> Option<bool> {
         let disparity = |w: usize| Some(scale_px_m / sensor.code.metres(u16::try_from(w).ok()?)?);
         let fine = |&(w, n): &(usize, f64)| {
@@ -195,7 +195,7 @@ impl RawHistogram {
         Some(tries.fold(0.0, f64::max) > GATHERED_AT_ALL)
     }
 
-    /// Are most depths multiples of this step? `None` where the words are no finer.
+    /// Whether most depths are multiples of this step. `None` where the words are no finer.
     pub fn on_depths(&self, step_m: f64, sensor: &Sensor) -> Option<bool> {
         let words = self.occurring();
         let depth = |w: usize| sensor.code.metres(u16::try_from(w).ok()?);
@@ -212,7 +212,7 @@ impl RawHistogram {
         (words.len() >= MIN_WORDS && all > 0.0).then_some(multiples > 0.5 * all)
     }
 
-    /// How much neighbouring words differ in number, 0 (smooth) to 1 (every other one empty).
+    /// Contrast between the counts of neighbouring words, 0 (smooth) to 1 (every other one empty).
     fn contrast(&self, words: &[(usize, f64)]) -> f64 {
         let (mut differ, mut sum) = (0.0, 0.0);
         for &(w, n) in words {
@@ -224,7 +224,7 @@ impl RawHistogram {
     }
 }
 
-/// Chance that so many words are all multiples of `step`, or of any coarser one.
+/// Probability that so many words are all multiples of `step`, or of any coarser step.
 fn all_multiples(step: usize, words: usize) -> f64 {
     let (step, n) = (step as f64, words as f64);
     (step.powf(-n) * (1.0 + step / (n - 1.0).max(1.0))).clamp(f64::MIN_POSITIVE, 1.0)
@@ -260,7 +260,7 @@ mod tests {
         words
     }
 
-    /// A matcher's steps of 1.28 to 13.4 words, each in the word nearest to it, and its own words.
+    /// A matcher's steps of 1.28 to 13.4 words, each stored in the nearest word; and the words' own step.
     #[test]
     fn raw_words_show_steps_that_are_no_whole_number_of_them() {
         let word_px = 0.125;
@@ -306,7 +306,7 @@ mod tests {
         assert_eq!(words(0.0, 0.0).lattice(&sensor, 43.5), Quantisation::default());
     }
 
-    /// Of targets in a few words, one of which the rounding to 0.2 mm has settled by chance.
+    /// Targets at a few words, one of which was decided by chance in the rounding to 0.2 mm.
     #[test]
     fn a_coarse_step_shows_in_few_words() {
         let sensor = kinect_v1(2);

@@ -1,4 +1,4 @@
-//! Steps of the words, and the variance that comes by other names than sigma.
+//! Quantisation steps of the raw words, and variance with other causes than sigma.
 
 mod coarse;
 pub mod comb;
@@ -16,7 +16,7 @@ use crate::terms::{Axis, PixelContext, Statistic};
 use crate::view::Recording;
 use lattice::{Quantisation, RawHistogram, Step};
 
-/// Variance that comes by other names than sigma: of steps, rows, and pixels.
+/// Variance with other causes than sigma: quantisation steps, rows, and pixels.
 #[derive(Debug, Clone, Copy)]
 pub struct Steps {
     depth_px_m2: f64,
@@ -35,13 +35,13 @@ impl Steps {
         let own_px = word_px(recording, fields[0].scale_px_m).unwrap_or(0.0);
         let words = step_px / own_px;
         let whole = own_px > 0.0 && (words.round() / words - 1.0).abs() < SAME_STEP;
-        // With frames to compare, what stands still is not in the variance.
+        // With frames to compare, fixed-pattern noise is not in the variance.
         let single = fields.iter().all(|f| f.frames.len() < 2);
         let still = if single { fixed_px2(structure) } else { 0.0 };
         Steps {
             depth_px_m2: lattice.depth.map_or(0.0, |step| step.size) * fields[0].scale_px_m,
-            // Words of a raw sensor are in the model's variance already. A step that is no whole number
-            // of them is rounded twice.
+            // The model's variance already includes the words of a raw sensor. A step that is no whole number
+            // of words is rounded twice.
             disparity_px: if whole {
                 (step_px.powi(2) - own_px.powi(2)).max(0.0).sqrt()
             } else {
@@ -51,7 +51,7 @@ impl Steps {
         }
     }
 
-    /// At a place, px^2.
+    /// Variance at a place, px^2.
     pub fn at(&self, p: &PixelContext) -> f64 {
         let depth_px = self.depth_px_m2 / (p.z * p.z);
         (depth_px * depth_px + self.disparity_px.powi(2)) / 12.0 + self.noise_px2
@@ -69,22 +69,22 @@ pub(in crate::diagnose) fn lattice<'a>(
         pictures.merge(&f.pictures);
         scale_px_m = f.scale_px_m;
     }
-    // In steps coarser than a target is deep, a target has one word.
+    // Where steps are coarser than a target is deep, it has a single word.
     let words = if words.is_few() { pictures } else { words };
     words.lattice(&recording.sensor, scale_px_m)
 }
 
-/// A raw word of the disparity, px.
+/// Size of a raw word of the disparity, px.
 fn word_px(recording: &Recording, px_m: f64) -> Option<f64> {
     let DepthCode::Disparity { slope, .. } = recording.sensor.code else { return None };
     Some((slope * px_m).abs())
 }
 
-/// Steps of two halves that differ by less, as a share, are one: the scan's own error twice.
+/// Relative difference below which the steps of two halves are equal: twice the scan's own error.
 const SAME_STEP: f64 = 0.005;
 
-/// The step of a raw recording's own words, px, where that is what is seen: a simulation in the same
-/// words has it too, and sigma holds the error that it makes.
+/// Step of a raw recording's own words, px, if that is the step found. A simulation in the same words has it
+/// too, and sigma includes its error.
 pub(in crate::diagnose) fn own_step(
     lattice: &Quantisation,
     recording: &Recording,
@@ -100,12 +100,12 @@ pub(in crate::diagnose) fn own_step_note(step: f64) -> String {
     )
 }
 
-/// A step of fewer sigmas errs as if by noise, of a twelfth of its square: Widrow and Kollar,
-/// Quantization Noise, 2008. What coarser ones leave follows the surface.
+/// Sigmas up to which a step acts as noise of a twelfth of its square (Widrow and Kollar, Quantization Noise,
+/// 2008). The error of coarser steps follows the surface.
 pub(in crate::diagnose) const COARSE_SIGMAS: f64 = 2.0;
 
-/// Neighbours in one coarse step err alike: such views show no window. Nor do they show what lines share,
-/// for whether a pixel jumps from frame to frame depends on where in a step its line lies.
+/// Drops windows and line variances of views with coarse steps. Neighbours in one step err together, and
+/// whether a pixel jumps between frames depends on where in a step its line lies.
 pub(in crate::diagnose) fn forget_windows(
     structure: &mut [Structure],
     fields: &[Field],
@@ -121,15 +121,15 @@ pub(in crate::diagnose) fn forget_windows(
     }
 }
 
-/// Steps of the disparity, or of the depth.
+/// A kind of step: of the disparity or of the depth.
 pub(in crate::diagnose) struct Kind {
     pub id: &'static str,
     pub parameter: &'static str,
     axis: Axis,
     pub of: fn(&Quantisation) -> Option<Step>,
-    /// A step in the middle of a view, px.
+    /// Size of a step in the middle of a view, px.
     px: fn(f64, &Field) -> f64,
-    /// Standard error of a step that is found, as a share.
+    /// Relative standard error of a step that is found.
     error: f64,
 }
 
@@ -157,7 +157,7 @@ impl Kind {
         self.axis == Axis::Z
     }
 
-    /// The variance that a step adds in each view, as a share of its noise's.
+    /// Variance that a step adds in each view, as a share of the noise variance.
     fn added(&self, step: f64, fields: &[Field]) -> impl Iterator<Item = f64> {
         fields.iter().map(move |f| {
             let sigma = f.middle_sigma_px().map_or(f64::INFINITY, f64::from);
@@ -165,9 +165,9 @@ impl Kind {
         })
     }
 
-    /// A model lacks this step, or has it too much. Its worth is the Kullback-Leibler divergence of the Gaussians
-    /// with and without its variance, over all readings, nats. That words come in steps tells far more, but of the
-    /// format.
+    /// Finding that a model lacks this step, or has it in excess. Its gain is the Kullback-Leibler divergence
+    /// of the Gaussians with and without its variance, over all readings, nats. Words in steps are far
+    /// stronger evidence, but of the format.
     fn finding(&self, step: f64, fields: &[Field]) -> Finding {
         let of = |(f, more): (&Field, f64)| {
             let readings: f64 = f.count.iter().map(|n| f64::from(*n)).sum();
@@ -189,8 +189,8 @@ impl Kind {
     }
 }
 
-/// A step is worth telling when the error it makes is this share of the noise in some view; that a model
-/// has one which the words contradict, when it is this share of the usual noise.
+/// Least error of a step that is reported, as a share of the noise in some view; for a step of the model that
+/// the words contradict, of the typical noise.
 const STEP_SHARE: f64 = 0.1;
 
 /// Steps of the model that the words do not lie on.

@@ -1,5 +1,4 @@
-//! How much a term differs from view to view: a random effect of the views, by restricted maximum
-//! likelihood.
+//! Scatter of a term from view to view: a random effect of the views, by restricted maximum likelihood.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -10,14 +9,14 @@ use crate::terms::{Basis, PixelContext, Term};
 
 /// Rounds of the expectation-maximisation; it starts at a scatter as large as the terms.
 const ROUNDS: usize = 200;
-/// A scatter below this share of a term is none: what noise leaves of it after so many rounds.
+/// A scatter below this share of a term counts as none: what noise leaves of it after so many rounds.
 const NONE: f64 = 0.02;
 
-/// Of a variance that the views leave open to this share nothing is told.
+/// No scatter is stated where the posterior variance of the sizes exceeds this share of it.
 const UNTOLD: f64 = 0.9;
 
-/// Standard deviation between views of each term's size, as a share of it. `views` are the residuals
-/// that the terms were fitted to.
+/// Standard deviation of each term's size between views, as a share of it. `views` are the data that the
+/// terms were fitted to.
 pub fn between(views: &[ViewData], terms: &[Term]) -> Vec<f64> {
     let evidence: Vec<Evidence> = views.par_iter().filter_map(|v| of_view(v, terms)).collect();
     let shares = scatter(&evidence, terms.len());
@@ -29,7 +28,7 @@ pub fn between(views: &[ViewData], terms: &[Term]) -> Vec<f64> {
     shares.iter().zip(terms).map(told).collect()
 }
 
-/// What a view says of the terms' sizes beyond their common one.
+/// Evidence of a view on the deviations of the terms' sizes from their common one.
 fn of_view(view: &ViewData, terms: &[Term]) -> Option<Evidence> {
     let sizes =
         |place: &PixelContext| -> Vec<f64> { terms.iter().map(|t| t.value(place)).collect() };
@@ -42,8 +41,8 @@ fn of_view(view: &ViewData, terms: &[Term]) -> Option<Evidence> {
     finite.then_some(evidence)
 }
 
-/// Of sizes s ~ N(0, T) with a diagonal T, seen as b ~ N(A s, A): the root of T (Laird and Ware 1982).
-/// The common size was fitted to these views, which takes one degree of freedom.
+/// Root of the diagonal T for sizes s ~ N(0, T), observed as b ~ N(A s, A) (Laird and Ware 1982). The common
+/// size was fitted to these views, which takes one degree of freedom.
 fn scatter(views: &[Evidence], terms: usize) -> Vec<f64> {
     let n = views.len() as f64;
     if n < 3.0 {
@@ -64,7 +63,7 @@ fn scatter(views: &[Evidence], terms: usize) -> Vec<f64> {
         }
         variance = seen + &unseen;
     }
-    // What planes absorb of a shape no view tells.
+    // No view measures the part of a shape that planes absorb.
     let told = |(t, unseen): (&f64, &f64)| if *unseen > UNTOLD * t { 0.0 } else { *t };
     let all = variance.iter().zip(&unseen).map(told);
     all.map(|t| (t * n / (n - 1.0)).sqrt()).collect()
@@ -77,8 +76,7 @@ mod tests {
     use super::*;
     use crate::rng::Seed;
 
-    /// Two terms that lean on one another, one of which scatters by 30 % and the other not at all, and
-    /// a third that cannot be seen.
+    /// Two correlated terms, one scattering by 30 % and the other not at all, and an unobservable third.
     #[test]
     fn the_scatter_comes_back_and_none_is_none() {
         let mut rng = Seed(4).stream("between");
@@ -88,7 +86,7 @@ mod tests {
         let mut view = |_| {
             let sizes = DVector::from_vec(vec![0.3 * draw(), 0.0]);
             let seen = &two * sizes + &root * DVector::from_vec(vec![draw(), draw()]);
-            // And one that planes absorb.
+            // And a third that planes absorb.
             Evidence { a: two.clone().resize(3, 3, 0.0), b: seen.resize_vertically(3, 0.0) }
         };
         let views: Vec<Evidence> = (0..400).map(&mut view).collect();

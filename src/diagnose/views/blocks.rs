@@ -1,4 +1,4 @@
-//! The size of the noise in patches large enough for a variance.
+//! Size of the noise in blocks large enough for a variance.
 
 use std::sync::Arc;
 
@@ -13,13 +13,13 @@ use crate::terms::DARKEST;
 pub const BLOCK_TILES: usize = 6;
 /// The least: narrower ones have hardly a pixel without the rim of a tile.
 const MIN_TILES: usize = 2;
-/// In most views half a block is worth this many samples: beyond -1/n the mean of log chi squared is
-/// off by a five hundredth of its standard deviation then.
+/// Least number of independent samples in half a block of the median view. Beyond -1/n, the mean of
+/// log chi squared is then off by a five-hundredth of its standard deviation.
 const WORTH: f64 = 24.0;
-/// Of a picture, px: what is as large a part of a smaller one is resolved as well.
+/// Picture width that [`BLOCK_TILES`] is meant for, px; blocks shrink with narrower pictures.
 const WIDTH_PX: usize = 640;
 
-/// Side of the blocks of these views of a picture `width` px wide, in tiles.
+/// Side of the blocks for these views of a picture `width` px wide, in tiles.
 pub fn block_tiles(views: &[SurveyedView], width: usize) -> usize {
     let mut per_px: Vec<f64> =
         views.iter().map(|v| v.frames / v.correlation.sum_of_squares.max(1.0)).collect();
@@ -31,17 +31,15 @@ pub fn block_tiles(views: &[SurveyedView], width: usize) -> usize {
     (MIN_TILES..BLOCK_TILES).find(large).unwrap_or(BLOCK_TILES)
 }
 
-/// Logarithm of the variance over the model's in patches large enough for a variance, beside a level of
-/// the view's own, which is free.
-/// Where `by_light`, a block falls into parts by their light: what is light and what is dark lies apart,
-/// for their mean is the noise of neither.
+/// Log ratio of the measured variance to the model's, block by block, with the view's own level as a free
+/// nuisance. With `by_light`, blocks are split by light: the mean over light and dark parts would be the
+/// noise of neither.
 pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
     let side = (tiles * SIDE) as f64;
     let first = view.places.first().map_or(1.0, |p| p.light);
     let lit = by_light && view.places.iter().any(|p| p.light != first);
     let min = if lit { MIN_LIT } else { MIN_FILLED } * side * side;
-    // With frames to compare, only what changes is noise; its still part is put back by what frames have in
-    // common.
+    // With frames to compare, only what changes is noise; the factor restores the part that frames share.
     let noise = |i: usize| match (&view.tiles[i], view.between_frame_factor) {
         (t, Some(factor)) => (t.temporal * factor, t.repeated),
         (t, None) => (t.temporal + t.rough_square, 1.0),
@@ -50,7 +48,7 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
         |i: usize| if lit { view.places[i].light.max(DARKEST).log2().floor() as i32 } else { 0 };
     let is_measured = |i: usize| view.tiles[i].pixels > 0.0 && noise(i).0.is_finite();
     let groups = in_patches(&view.places, side, |i| is_measured(i).then(|| octave(i)));
-    // What the box's mean took with it.
+    // Share of the variance removed with the box mean.
     let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
     let kept = if view.between_frame_factor.is_some() { 1.0 } else { 1.0 - taken };
     let mut blocks = ViewData { precision: vec![0.0], ..ViewData::default() };
@@ -66,7 +64,7 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
         let worth = repeated * view.frames / view.correlation.sum_of_squares;
         let mut place = view.places[group[0]];
         place.average(&view.places, &|of| sum(of) / n);
-        // Variances add up, and where light is what they come from they are as its inverse (shot noise).
+        // Variances add up, and shot noise is proportional to 1 / light.
         place.light = n / sum(&|i| 1.0 / view.places[i].light);
         Arc::make_mut(&mut blocks.places).push(place);
         // The mean of log chi^2 / n is about -1 / n.
@@ -77,9 +75,9 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
     blocks
 }
 
-/// Share of a block that is needed: a few pixels at the rim give no variance.
+/// Least share of a block that must be filled: a few pixels at the rim give no variance.
 const MIN_FILLED: f64 = 0.5;
-/// The same where a block falls into parts by their light.
+/// Same where blocks are split by light.
 const MIN_LIT: f64 = 0.125;
 
 #[cfg(test)]
@@ -88,7 +86,7 @@ mod tests {
     use crate::diagnose::views::tiles::Tile;
     use crate::terms::PixelContext;
 
-    /// As large a part of the picture, but no fewer independent samples than a variance needs.
+    /// Blocks cover the same share of the picture, but no fewer independent samples than a variance needs.
     #[test]
     fn blocks_are_as_small_as_the_picture_and_the_noise_allow() {
         let tiles = |width, frames, sum_of_squares| {
@@ -102,8 +100,7 @@ mod tests {
         assert_eq!(block_tiles(&[], 160), BLOCK_TILES);
     }
 
-    /// A print of two greys, half a block a square: shot noise is told of either grey, and not of what
-    /// lies between them.
+    /// A print of two greys in squares of half a block: shot noise is measured for each grey separately.
     #[test]
     fn what_is_light_and_what_is_dark_lie_apart() {
         const ACROSS: usize = 10 * BLOCK_TILES;
@@ -121,7 +118,7 @@ mod tests {
         assert_eq!(data.places.len(), 200, "two parts of a hundred blocks");
         for (place, log_variance) in data.places.iter().zip(&data.response) {
             assert!([0.25, 2.0].iter().any(|grey| (place.light / grey - 1.0).abs() < 1e-9));
-            // The mean of a log chi^2 is put right by one over what the block is worth.
+            // The correction of the mean of log chi^2 is one over the block's independent samples.
             assert!((log_variance + place.light.ln()).abs() < 2.0 / 400.0, "{log_variance}");
         }
         let whole = blocks(&view, BLOCK_TILES, false);

@@ -1,19 +1,19 @@
-//! Sums over boxes of an image, and what is left of it without their mean, or without a cubic.
+//! Box sums of an image, and its residual about the box mean or about a cubic.
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::stats::{MAD_TO_SIGMA, median_in_place, range};
 
-/// Side of the box whose mean is taken out, px: several windows, and less than a lens's bowl.
+/// Side of the box whose mean is subtracted, px: several matching windows, and less than a lens's bowl.
 pub const SMOOTH_PX: usize = 49;
 
-/// Tells of every finite pixel the sum and the number of the finite pixels no farther than `reach` from it
-/// along either axis: running sums down the columns, and of these along the row.
+/// Calls `tell` for every finite pixel with the sum and number of the finite pixels within `reach` of it
+/// along either axis. Uses running sums down the columns, and of these along the row.
 pub fn over_boxes(image: &[f32], width: usize, reach: usize, tell: impl FnMut(usize, f64, f64)) {
     over_boxes_within(image, width, reach, f32::MAX, tell);
 }
 
-/// The same, where what is larger than `limit` is in no sum.
+/// Same, with values larger than `limit` left out of the sums.
 fn over_boxes_within(
     image: &[f32],
     width: usize,
@@ -58,8 +58,8 @@ fn over_boxes_within(
     }
 }
 
-/// Minus its mean over a box of `side` px, where at least a quarter of the box is there; NaN elsewhere. Gross errors
-/// are in no mean: a few at a target's rim would lift all of their neighbours.
+/// Subtracts the mean over a box of `side` px where at least a quarter of the box is finite; NaN elsewhere.
+/// Gross errors are left out of the means: a few at a target's rim would shift all their neighbours.
 pub fn high_pass(image: &[f32], width: usize, side: usize) -> Vec<f32> {
     let mut left = vec![f32::NAN; image.len()];
     let limit = gross_limit(image);
@@ -71,10 +71,10 @@ pub fn high_pass(image: &[f32], width: usize, side: usize) -> Vec<f32> {
     left
 }
 
-/// So many pixels are enough for the ten coefficients of a cubic: they add 1 / 200 of the noise's variance.
+/// Pixels used to fit the ten coefficients of a cubic; the fit adds 1 / 200 of the noise's variance.
 const FITTED: usize = 2000;
 
-/// Takes out the cubic in column and row that fits best; one value of each of the `pixels`.
+/// Subtracts the best-fitting cubic in column and row from `values`, one per pixel of `pixels`.
 pub fn take_out_cubic(values: &mut [f32], pixels: &[u32], width: usize) {
     let at = |i: u32| [i as usize % width, i as usize / width].map(|at| at as f64);
     let ranges = [0, 1].map(|k| range(pixels.iter().map(|&i| at(i)[k])));
@@ -89,7 +89,7 @@ pub fn take_out_cubic(values: &mut [f32], pixels: &[u32], width: usize) {
     };
     let limit = gross_limit(values);
     let (mut normal, mut cross) = (SMatrix::<f64, 10, 10>::zeros(), SVector::<f64, 10>::zeros());
-    // Odd, so that even and odd columns are met alike.
+    // Odd, so that even and odd columns are sampled alike.
     let stride = (pixels.len() / FITTED) | 1;
     for (&i, r) in pixels.iter().zip(&*values).step_by(stride) {
         if r.abs() <= limit {
@@ -104,13 +104,13 @@ pub fn take_out_cubic(values: &mut [f32], pixels: &[u32], width: usize) {
     }
 }
 
-/// Of means over a square of white pixels, the squared correlation summed over all lags.
+/// Squared correlation, summed over all lags, of white pixels averaged over squares.
 pub fn repeats_of_box(side: f64) -> f64 {
     ((2.0 * side * side + 1.0) / (3.0 * side)).powi(2)
 }
 
-/// Beyond this an error is gross: six robust standard deviations of what is there about nothing. None is where most
-/// errors are nothing.
+/// Gross-error limit: six robust standard deviations about zero. No limit (`f32::MAX`) where most values are
+/// exactly zero.
 pub fn gross_limit(image: &[f32]) -> f32 {
     let mut sizes: Vec<f32> = image.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
     let limit = 6.0 * MAD_TO_SIGMA as f32 * median_in_place(&mut sizes);
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use crate::stats::SummedArea;
 
-    /// A block that sees something else stays what it is, and its neighbours too.
+    /// A block that sees something else keeps its values, and so do its neighbours.
     #[test]
     fn gross_errors_lift_no_neighbours() {
         const SIDE: usize = 60;

@@ -1,4 +1,4 @@
-//! Columns that step, at different distances in every view: each view's own image tells them.
+//! Steps between columns, spaced differently in every view and found in each view's own image.
 
 use serde_json::Map;
 use statrs::statistics::Statistics;
@@ -12,13 +12,14 @@ use crate::measure::ColumnSteps;
 use crate::stats::{median, range};
 use crate::terms::{Axis, Statistic};
 
-/// Even where all views agree the firmware was free to do otherwise.
+/// Least spread stated: even where all views agree, the firmware could have varied the period.
 const MIN_SPREAD: f64 = 1.01;
 const BANDING: &str = "column-banding";
-/// A step is one of the read-out's: that is known to the scale of the disparity (0.6 % off on a Kinect).
+/// Relative standard error of a step. It is one read-out step, known up to the disparity scale (0.6 % off
+/// on a Kinect).
 const STEP_ERROR: f64 = 0.01;
 
-/// The finding, where views show steps and the model does not say so.
+/// Finding of column steps, where views show them and the model does not have them.
 pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) -> Option<Finding> {
     let seen: Vec<(&Field, ColumnSteps)> =
         fields.iter().filter_map(|f| Some((f, f.column_steps?))).collect();
@@ -26,12 +27,12 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
     if known_of_views {
         return None;
     }
-    // Any of the views may be the clearest.
+    // Smallest p-value of any view; Bonferroni-corrected below.
     let clearest = seen.iter().map(|(_, s)| s.p()).fold(1.0, f64::min);
-    // One of the read-out's, whichever way it goes.
+    // One read-out step, of either sign.
     let step_px = seen.first()?.1.step_px.abs();
     let [shortest, longest] = range(seen.iter().map(|(_, s)| s.period_px));
-    // Of a saw-tooth.
+    // RMS of a saw-tooth.
     let rms_px = step_px / 12f64.sqrt();
     let middle = |of: &dyn Fn(&Field) -> f64| {
         median(&mut seen.iter().map(|(f, _)| of(f)).collect::<Vec<f64>>())
@@ -47,7 +48,7 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
     let period_px = logs.clone().mean().exp();
     let std_error = period_px * logs.std_dev() / (seen.len() as f64).sqrt();
     parameters.insert("period_px".into(), estimate(period_px, std_error));
-    // The largest over the smallest: how many views there are decides it.
+    // Largest over smallest period: it depends on the number of views, so it has no standard error.
     parameters.insert("spread".into(), estimate((longest / shortest).max(MIN_SPREAD), f64::NAN));
     let plain = named(BANDING, Statistic::Bias, Axis::Column);
     Some(Finding {

@@ -1,4 +1,4 @@
-//! Frames laid on a view's plane: what every pixel measures beside what is expected of it.
+//! Accumulates a view's frames: the residual of every pixel from its expected disparity.
 
 use super::field::{CLIP_SIGMAS, Field};
 use super::known::KnownTerms;
@@ -12,13 +12,14 @@ use crate::model::SigmaModel;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 use crate::terms::Term;
 
-/// Disparities that spread less than this over a view show no slope, px.
+/// Least standard deviation of the disparity over a view for fitting a slope, px.
 const MIN_SPREAD_PX: f64 = 0.5;
-/// A model that is right spreads residuals as the view itself does, to a few per cent.
+/// Factor by which the spread about the model must exceed the view's own for the model to be wrong. With a
+/// correct model the two agree to a few per cent.
 const FAR_OFF: f32 = 2.0;
 
 impl Field {
-    /// Collect the residuals of all frames (time since the first, s).
+    /// Collects the residuals of all frames, each given with its time since the first, s.
     pub fn accumulate(
         &mut self,
         frames: impl Iterator<Item = (f64, Frame)>,
@@ -51,7 +52,7 @@ impl Field {
         self.close();
     }
 
-    /// Where a matcher's columns step: an image tells it without a plane.
+    /// Finds the steps between a matcher's columns from the image alone, without a plane.
     fn find_column_steps(&mut self, image: &Frame, table: &DepthTable) {
         let disparity = |&word: &u16| (self.scale_px_m / f64::from(table.metres(word))) as f32;
         let disparities: Vec<f32> = image.raw.iter().map(disparity).collect();
@@ -69,7 +70,7 @@ impl Field {
         self.pixels.iter().map(of).collect()
     }
 
-    /// Disparity that the model expects at each pixel, px; its terms of the variance go to sigma.
+    /// Disparity that the model expects at each pixel, px. Its variance terms scale `sigma`.
     fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
         let n = self.pixels.len();
         let mut expected: Vec<f32> =
@@ -88,7 +89,7 @@ impl Field {
         expected
     }
 
-    /// What was taken out of each pixel while reading, px: whole columns' steps, and these terms.
+    /// Bias subtracted from each pixel while reading, px: the column steps and these terms.
     pub fn taken_out(&self, terms: &[Term], bench: &Workbench<'_>) -> Vec<f32> {
         let places = Places::of(self, &bench.sensor.camera, &bench.rays, self.time_s);
         let of_terms = |k| Term::sum(terms, &places.pixel(k)) as f32;
@@ -96,9 +97,8 @@ impl Field {
         self.pixels.iter().enumerate().map(of_pixel).collect()
     }
 
-    /// The spread to clip by, px: the view's own, or that about what the model expects where the model is
-    /// wrong by far more. Clipped by the view's own, a model of a bowl that is not there would leave no
-    /// pixel to tell it by.
+    /// Spread to clip by, px: the view's own, or the spread about the model where the model is wrong by far
+    /// more. If the model has a bowl that is not there, clipping by the view's own would leave no pixel.
     fn spread_beside(&self, frame: &Frame, expected: &[f32], table: &DepthTable) -> f32 {
         let off = |(&i, &d): (&u32, &f32)| {
             let z = table.metres(frame.raw[i as usize]);

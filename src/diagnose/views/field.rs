@@ -1,7 +1,7 @@
-//! Residuals that can be trusted: every pixel of the target, all frames, about one plane a view.
+//! Residuals of a view: every pixel of the target, all frames, about one plane.
 //!
-//! In disparity a plane is exactly affine in the image, so the residual is taken there, in px of
-//! fx * baseline / z. Nothing is cut by a RANSAC threshold: what strays is clipped, and counted.
+//! A plane is exactly affine in the image in disparity, so residuals are taken there, in px of
+//! fx * baseline / z. No RANSAC threshold removes pixels: outliers are clipped and counted.
 
 use super::box_sums::{SMOOTH_PX, high_pass};
 use super::infrared::amplitudes;
@@ -23,7 +23,7 @@ use crate::view::{Sensor, View};
 #[derive(Debug, Clone, Default)]
 pub struct Field {
     pub name: String,
-    /// On the recording's clock, s.
+    /// Time on the recording's clock, s.
     pub time_s: f64,
     pub plane: Plane,
     /// fx * baseline, px m.
@@ -32,7 +32,7 @@ pub struct Field {
     pub height: usize,
     /// Pixels of the target, ascending.
     pub pixels: Vec<u32>,
-    /// Of each, its distance from the target's edge, px.
+    /// Distance of each pixel from the target's edge, px.
     pub edge: Vec<f32>,
     /// Model's standard deviation of the disparity of each pixel, px.
     pub sigma: Vec<f32>,
@@ -46,42 +46,41 @@ pub struct Field {
     pub count: Vec<u16>,
     /// Frames with a measurement.
     pub measured: Vec<u16>,
-    /// What whole columns err by, where the first frame shows it; the residuals are beside it.
+    /// Error of whole columns, where the first frame shows it; the residuals are without it.
     pub column_steps: Option<ColumnSteps>,
     /// Residuals of the first frames, px, in order.
     pub first: Vec<Vec<f32>>,
     /// Time and mean residual of each frame, s since the first and px.
     pub frames: Vec<(f64, f64)>,
     pub left_out: LeftOut,
-    /// Each frame's residual as a line in the disparity: at the view's middle, px, and its slope.
+    /// Line through each frame's residuals over the disparity: value at the view's middle, px, and slope.
     pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
-    /// Of the target, as the view states it.
+    /// Flatness of the target as the view states it, m.
     pub flatness_m: Option<f64>,
     pub temperature_c: Option<f64>,
     pub ambient_lux: Option<f64>,
-    /// Infrared amplitude times the square of the distance over the cosine of the incidence: how
-    /// light the surface is, in the image's own units. Empty without an infrared image.
+    /// Light of the surface: infrared amplitude times the squared distance over the cosine of the incidence
+    /// angle, in the image's own units. Empty without an infrared image.
     pub light: Vec<f32>,
     /// Median infrared amplitude over the target, in the image's own units.
     pub infrared: Option<f64>,
     /// How often each stored word occurs on the target.
     pub words: RawHistogram,
-    /// The same anywhere in the pictures, where the target has few words.
+    /// Same over the whole images, counted where the target has few distinct words.
     pub pictures: RawHistogram,
-    /// The target's region was given; else it ends where too little is measured.
+    /// Whether the target's region was given; otherwise it ends where too little is measured.
     pub region_given: bool,
-    /// Where the target ends before something else.
+    /// Edges where the target ends in front of something else.
     pub edges: Edges,
 }
 
-/// Beyond this many sigmas of the model, or of the view's own residuals where errors the model
-/// lacks are larger, a residual is no noise: it is kept out of the means and left to the tests of
-/// the tails.
+/// Clipping limit, in standard deviations of the model or, where larger, of the view's own residuals.
+/// Residuals beyond it are excluded from the means and left to the tests of the tails.
 pub const CLIP_SIGMAS: f32 = 6.0;
 
 impl Field {
-    /// Read the view and collect its residuals.
+    /// Reads the view and collects its residuals.
     ///
     /// # Errors
     /// When no frame can be read or none shows a plane.
@@ -103,7 +102,7 @@ impl Field {
         Ok(field)
     }
 
-    /// The same pixels about the same plane, seen in other frames (time since the first, s).
+    /// Same pixels about the same plane, with other frames (each with its time since the first, s).
     pub fn with_frames(
         &self,
         frames: impl Iterator<Item = (f64, Frame)>,
@@ -118,7 +117,7 @@ impl Field {
         field
     }
 
-    /// Read how light the surfaces are; without an infrared image that can be read it stays unknown.
+    /// Reads the light of the surface, if there is a readable infrared image.
     fn read_infrared(&mut self, view: &View, rays: &Rays) {
         let Some(amplitudes) = amplitudes(view, &self.on_target(), self.width) else { return };
         self.infrared = Some(f64::from(median_in_place(&mut amplitudes.clone())));
@@ -139,8 +138,8 @@ impl Field {
         (light > 0.0).then_some(f64::from(light))
     }
 
-    /// Variance over the frames of their lines at this disparity, px^2: what moves as a whole is
-    /// not the pixels' noise.
+    /// Variance over the frames of their lines at this disparity, px^2. Motion of the whole frame is not
+    /// pixel noise.
     pub fn moved_px2(&self, disparity: f64) -> f64 {
         let x = disparity - self.scale_px_m * self.plane.q.z;
         let n = self.lines.len() as f64;
@@ -152,7 +151,7 @@ impl Field {
         self.lines.iter().map(|l| (at(l) - mean).powi(2)).sum::<f64>() / n
     }
 
-    /// Pixels measured in a frame, on average.
+    /// Mean number of pixels measured in a frame.
     pub fn measured_pixels(&self) -> f64 {
         let measured: f64 = self.measured.iter().map(|&n| f64::from(n)).sum();
         measured / self.frames.len().max(1) as f64
@@ -169,7 +168,7 @@ impl Field {
         image
     }
 
-    /// The same without what is smooth.
+    /// Same, high-passed.
     pub fn high_passed(&self, values: &[f32]) -> Vec<f32> {
         high_pass(&self.image(values), self.width, SMOOTH_PX)
     }
@@ -189,8 +188,7 @@ impl Field {
         }
     }
 
-    /// These pixels of a picture about a plane, before anything is measured at them and with nothing
-    /// known of the view.
+    /// Field of these pixels about a plane, without measurements or notes of the view.
     pub(in crate::diagnose) fn unseen(
         plane: Plane,
         scale_px_m: f64,
@@ -206,7 +204,7 @@ impl Field {
         field
     }
 
-    /// Nothing is measured at the pixels yet.
+    /// Discards all measurements.
     pub(super) fn forget(&mut self) {
         let n = self.pixels.len();
         (self.mean, self.square) = (vec![0.0; n], vec![0.0; n]);
@@ -227,12 +225,12 @@ impl Field {
         self.scale_px_m * self.plane.inverse_depth(x, y)
     }
 
-    /// What the whole column of pixel `i` of the picture errs by, px.
+    /// Error of the whole column of pixel `i` of the picture, px.
     pub fn column_error(&self, i: u32) -> f32 {
         self.column_steps.map_or(0.0, |steps| steps.error_px(i as usize % self.width) as f32)
     }
 
-    /// The model's sigma in the middle of the target, px.
+    /// Model's sigma in the middle of the target, px.
     pub fn middle_sigma_px(&self) -> Option<f32> {
         self.sigma.get(self.sigma.len() / 2).copied()
     }

@@ -5,18 +5,18 @@ use crate::io::InfraredImage;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 use crate::view::View;
 
-/// Half the side of the window that a pixel's light is read from, px: five across, which are 100
-/// readings of four frames. A Kinect's read noise of 10.4 (Landau et al. 2015), as large as paper at
-/// 4 m is light, is then 1.3; its matcher sees a window of nine.
+/// Half the side of the window that a pixel's light is read from, px: five across, or 100 readings in
+/// four frames. This reduces a Kinect's read noise of 10.4 (Landau et al. 2015), the amplitude of paper at
+/// 4 m, to 1.3; its matching window is 9 px.
 const LIGHT_REACH: usize = 2;
-/// What is darker than so many standard errors of that median is as dark as anything.
+/// Floor of the light in standard errors of that median; darker pixels cannot be told apart.
 const SURE_LIGHT_ERRORS: f64 = 2.0;
-/// Standard error of a Gaussian's median, of that of its mean: the root of pi / 2.
+/// Standard error of a Gaussian's median over that of its mean: the root of pi / 2.
 const MEDIAN_ERROR: f64 = 1.2533;
 
-/// Infrared amplitude at each pixel of a target, in the image's own units: the median of its
-/// neighbours on the target in the view's first frames, for what is dark is cut off at nought and has
-/// too large a mean. `None` without an image that can be read.
+/// Infrared amplitude at each pixel of a target, in the image's own units: the median of its neighbours
+/// on the target in the view's first frames. The mean of dark pixels is too large because their noise is
+/// clipped at zero. `None` without a readable image.
 pub fn amplitudes(view: &View, on_target: &[bool], width: usize) -> Option<Vec<f32>> {
     let height = on_target.len() / width.max(1);
     let read = |f| InfraredImage::read(f, [width, height]).ok();
@@ -57,12 +57,12 @@ mod tests {
     use crate::view::{FrameRef, ViewNotes};
 
     const SIZE: [usize; 2] = [64, 48];
-    /// Read noise and the light of the two halves of the target, in words that begin at nought.
+    /// Read noise, and the light of the two halves of the target, in words that start at zero.
     const NOISE: f64 = 10.4;
     const GREYS: [f64; 2] = [6.0, 40.0];
 
-    /// What is dark beside its own noise is no lighter for being cut off at nought; what is light
-    /// stays as light as it is up to the edge between the two.
+    /// Clipping at zero does not brighten the half that is darker than its own noise; the bright half keeps
+    /// its light up to the edge between the two.
     #[test]
     fn light_is_the_middle_of_its_neighbours() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -86,7 +86,7 @@ mod tests {
         assert!(mean[0] > 1.2 * GREYS[0], "a mean is too large where it is dark: {mean:?}");
         let view =
             View { name: "0".into(), depth: Vec::new(), infrared, notes: ViewNotes::default() };
-        // The uppermost rows are no target, and nothing is said of them.
+        // The top rows are not on the target and get no values.
         let off = 4 * SIZE[0];
         let on_target: Vec<bool> = (0..SIZE[0] * SIZE[1]).map(|i| i >= off).collect();
         let light = amplitudes(&view, &on_target, SIZE[0]).expect("infrared");

@@ -1,4 +1,4 @@
-//! What the model knows already: it is taken out before anything is looked for.
+//! The model's known effects, which are subtracted before any search.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +10,17 @@ use crate::model::{Covariance, NoiseModel, UNEXPLAINED};
 use crate::stats::mean;
 use crate::terms::{Axis, Basis, Statistic, Term, by_term};
 
-/// The model's effects as terms, and the rest by name.
+/// The model's effects as terms; those without a formula by name only.
 #[derive(Debug, Clone, Default)]
 pub struct KnownTerms {
-    /// Of the disparity, px.
+    /// Terms of the disparity, px.
     pub bias: Vec<Term>,
-    /// Of the logarithm of its variance.
+    /// Terms of the logarithm of its variance.
     pub variance: Vec<Term>,
     entries: Vec<(String, Map<String, Value>)>,
     /// Fitted shapes with the covariance of their coefficients.
     learnt: Vec<(Vec<Term>, Covariance)>,
-    /// What terms differ by from view to view: one standard deviation of each.
+    /// Scatter of terms from view to view: one standard deviation of each.
     scatter: Vec<Term>,
 }
 
@@ -54,7 +54,7 @@ impl KnownTerms {
         known
     }
 
-    /// Take a parameter of an effect for known; nothing is taken out for it.
+    /// Marks a parameter of an effect as known, without subtracting anything.
     pub fn learn(&mut self, id: &str, name: &str, value: f64) {
         let at = self.entries.iter().position(|(known, _)| known == id);
         let at = at.unwrap_or_else(|| {
@@ -64,7 +64,7 @@ impl KnownTerms {
         self.entries[at].1.insert(name.into(), value.into());
     }
 
-    /// Take what `found` has for known, whatever was learnt since.
+    /// Marks all parameters of `found` as known, overriding what was learnt since.
     pub fn overrule(&mut self, found: &KnownTerms) {
         for (id, parameters) in &found.entries {
             for name in parameters.keys() {
@@ -75,7 +75,7 @@ impl KnownTerms {
         }
     }
 
-    /// Is a part of the bias a shape that was fitted?
+    /// Whether a part of the bias is a fitted shape.
     pub fn bias_is_learnt(&self) -> bool {
         self.learnt.iter().flat_map(|(shape, _)| shape).any(|t| t.statistic == Statistic::Bias)
     }
@@ -85,7 +85,7 @@ impl KnownTerms {
         ray_share(&self.bias)
     }
 
-    /// Does the noise change its size in a way that has no name?
+    /// Whether the size of the noise varies in a way that has no name.
     pub fn has_uneven_noise(&self) -> bool {
         let nameless = |t: &Term| {
             use Basis::{Curve, Map, Pair, Ring};
@@ -94,12 +94,12 @@ impl KnownTerms {
         self.has(UNEXPLAINED) && self.variance.iter().any(nameless)
     }
 
-    /// What single views differ from the known terms by: one standard deviation of each.
+    /// Scatter of single views about the known terms: one standard deviation of each.
     pub fn between_views(&self, statistic: Statistic) -> Vec<Term> {
         self.scatter.iter().filter(|t| t.statistic == statistic).cloned().collect()
     }
 
-    /// What the learnt terms may be off by: terms that err together, by one standard deviation.
+    /// Uncertainty of the learnt terms: groups of terms that err together, by one standard deviation.
     pub fn errors(&self, statistic: Statistic) -> Vec<Vec<Term>> {
         let mut parts: BTreeMap<(u32, usize), Vec<Term>> = BTreeMap::new();
         for (shape, covariance) in &self.learnt {
@@ -115,7 +115,7 @@ impl KnownTerms {
         parts.into_values().filter(|part| !part.is_empty()).collect()
     }
 
-    /// By how much a measured depth is off by the known laws of the distance, m, as `correct` undoes them.
+    /// Error of a measured depth by the known laws of the distance, m, as `correct` undoes them.
     pub fn law_m(&self, z: f64, session_s: f64, px_m: f64) -> f64 {
         let of = |id, name| self.parameter(id, name);
         let scale = of("depth-scale", "scale");
@@ -129,7 +129,7 @@ impl KnownTerms {
         z - px_m / (px_m * factor / z - offset_px.unwrap_or(0.0))
     }
 
-    /// The coefficient of a known law of the distance; one fitted to references undoes it by minus this.
+    /// Coefficient of a known law of the distance; a law fitted to references undoes it by minus this.
     pub fn law(&self, family: &str) -> Option<f64> {
         match family {
             "depth-scale" => self.parameter(family, "scale").map(|scale| 1.0 - scale.recip()),
@@ -138,8 +138,8 @@ impl KnownTerms {
         }
     }
 
-    /// What is left of the learnt terms' errors beside these parts: one standard deviation of every
-    /// coefficient, each for itself. Profiles of single lines are not among them.
+    /// Independent errors of the learnt terms' coefficients beyond [`KnownTerms::errors`]: one standard
+    /// deviation of each. Profiles of single lines are excluded.
     pub fn own_errors(&self, statistic: Statistic) -> Vec<Term> {
         let fitted = self.learnt.iter().filter(|(_, c)| !c.factors.is_empty());
         let of = |(shape, covariance): &'_ (Vec<Term>, Covariance)| -> Vec<Term> {
@@ -154,12 +154,12 @@ impl KnownTerms {
         fitted.flat_map(of).collect()
     }
 
-    /// Variance of what learnt profiles of single columns, or of single rows, may be off by, px^2.
+    /// Error variance of the learnt profiles of single columns, or of single rows, px^2.
     pub fn error_of_lines_px2(&self, axis: Axis) -> f64 {
         let of = |(shape, covariance): &(Vec<Term>, Covariance)| -> f64 {
             by_term(shape, &covariance.variances)
                 .filter(|(term, _)| term.basis.axis() == axis)
-                // What was never learnt has no error.
+                // Coefficients that were never learnt have no error.
                 .filter_map(|(_, mine)| mean(mine.iter().copied().filter(|v| *v > 0.0)))
                 .sum()
         };
@@ -174,7 +174,7 @@ impl KnownTerms {
         self.entries.iter().find(|(known, _)| known == id).map(|(_, parameters)| parameters)
     }
 
-    /// The parameters of an entry, as they are told.
+    /// Parameters of an entry as text.
     pub fn in_words(&self, id: &str) -> String {
         let entry = self.entry(id).into_iter();
         let numbers = entry.flat_map(|p| p.keys().filter_map(|n| Some((n, number(p, n)?))));

@@ -1,5 +1,4 @@
-//! What the model knows is not known exactly: where new views differ from it by no more than its own
-//! error, nothing is missing.
+//! The model's own uncertainty: differences of new views that it explains are no missing effects.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -15,14 +14,14 @@ use crate::diagnose::search::variance::error_of_sigma;
 use crate::model::{Domain, SigmaModel};
 use crate::terms::{PixelContext, Statistic, Term};
 
-/// Chance that a model which is right differs by more than its own error.
+/// Probability that a correct model differs by more than its own error.
 const LEVEL: f64 = 1e-3;
 
-/// Less than this of the views is not worth a remark.
+/// Least share of the views worth a remark, percent.
 const TELLABLE_PERCENT: f64 = 0.5;
 
-/// What the model may be off by: parts that err together, by a standard normal number times their
-/// terms, and terms of which every coefficient errs for itself.
+/// Uncertainty of the model: `parts` err together, each by a standard normal number times its terms; in `own`
+/// each coefficient errs independently.
 #[derive(Default)]
 struct Errors {
     parts: Vec<Vec<Term>>,
@@ -49,9 +48,8 @@ impl Errors {
         }
     }
 
-    /// By how much the views differ from the model along each column: the posterior mean, or, where
-    /// that is more than the model's error explains, the part of it that its error does; as terms.
-    /// Empty where there is nothing to say.
+    /// Difference of the views from the model along each column, as terms: the posterior mean, scaled down
+    /// where it exceeds what the model's error explains. Empty without errors or evidence.
     fn settled(&self, data: &[ViewData]) -> Vec<Term> {
         let n = self.count();
         let of = |view: &ViewData| -> Option<Evidence> {
@@ -81,39 +79,40 @@ impl Errors {
     }
 }
 
-/// The posterior mean of standard normal numbers, held within what chance gives them.
+/// Posterior mean of standard normal coefficients, limited to what chance gives them.
 fn nearest(evidence: &[Evidence], n: usize) -> Option<DVector<f64>> {
     let Evidence { a, b } = Evidence::sum(n, 0.0, evidence);
-    // The new views scatter beyond their noise, too.
+    // The new views also scatter beyond their noise.
     let dispersion = Null::of(evidence, 0, 1.0)?.about_fit;
     let (a, b) = (a / dispersion, b / dispersion);
     let eigen = a.symmetric_eigen();
     let along = eigen.eigenvectors.transpose() * b;
     let seen = || along.iter().zip(eigen.eigenvalues.iter()).filter(|(_, l)| **l > 1e-9);
-    // A score of information l has the variance l + l^2 where the part itself has that of one.
+    // A score with information l has the variance l + l^2 if the coefficient has unit variance.
     let square: f64 = seen().map(|(b, l)| b * b / (l + l * l)).sum();
     let limit = ChiSquared::new(seen().count().max(1) as f64).ok()?.inverse_cdf(1.0 - LEVEL);
-    // Of a difference so many times as large as the model's error the rest is the views' own.
+    // The excess over the model's error is the views' own.
     let within = (limit / square.max(limit)).sqrt();
     let shrunk =
         DVector::from_fn(n, |k, _| within * along[k] / (1.0 + eigen.eigenvalues[k].max(0.0)));
     Some(eigen.eigenvectors * shrunk)
 }
 
-/// Log variance by which sigma may be off in a part of every view and bring less than 2 nats: the tiles of a long
-/// recording weigh a million (18 views of 4 frames of 640 x 480 weigh two and a half).
+/// Error of sigma, in log variance, that brings less than 2 nats if it is in a part of every view. The
+/// tiles of a long recording weigh a million (18 views of 4 frames of 640 x 480 weigh two and a half
+/// million).
 const UNSEEN: f64 = 0.002;
 
-/// Is a place so far outside the model's domain that sigma, which is held at the domain's edge, is seen to be off
-/// from what its form goes on to? There the model says nothing of the noise.
+/// Whether a place is so far outside the model's domain that sigma, held at the domain's edge, visibly
+/// differs from the continuation of its form. The model says nothing of the noise there.
 pub fn is_beyond(sigma: &SigmaModel, z: f64, theta: f64) -> bool {
     let log_variance = 2.0 * sigma.ln_beyond_domain(z, theta);
-    // What the form cannot go on to is beyond it, too.
+    // NaN: the form cannot be continued there.
     log_variance.is_nan() || log_variance.abs() > UNSEEN
 }
 
 impl Survey {
-    /// Do not measure the noise where the model says nothing of it.
+    /// Drops the measured noise where the model says nothing of it.
     pub fn forget_noise_beyond(&mut self, sigma: &SigmaModel) {
         for (place, t) in self.views.iter_mut().flat_map(SurveyedView::tiles_mut) {
             if is_beyond(sigma, place.z, place.theta) {
@@ -122,7 +121,7 @@ impl Survey {
         }
     }
 
-    /// What was left out by [`Survey::forget_noise_beyond`], in words.
+    /// Remark on what [`Survey::forget_noise_beyond`] left out.
     pub fn noise_untested(&self, sigma: &SigmaModel) -> Option<String> {
         let places = || self.views.iter().flat_map(|v| v.places.iter());
         let beyond = places().filter(|p| is_beyond(sigma, p.z, p.theta)).count();
@@ -136,7 +135,7 @@ impl Survey {
         })
     }
 
-    /// Take out of the views' means what the model's biases may be off by.
+    /// Subtracts from the views' means what the uncertainty of the model's biases explains.
     pub fn absorb_model_bias_error(&mut self, known: &KnownTerms) {
         let off = Errors::of(known, Statistic::Bias).settled(&self.coarse_mean_data());
         if off.is_empty() {
@@ -151,7 +150,7 @@ impl Survey {
         });
     }
 
-    /// The same for the size of the noise: sigma's own error and that of known terms.
+    /// Same for the size of the noise: the uncertainty of sigma and of known terms.
     pub fn absorb_model_variance_error(&mut self, known: &KnownTerms, sigma: &SigmaModel) {
         let mut errors = Errors::of(known, Statistic::Variance);
         errors.parts.extend(error_of_sigma(&self.reach, sigma));
@@ -173,8 +172,8 @@ impl Survey {
 mod tests {
     use super::*;
 
-    /// Eq. 1 is held below 1 m: at 0.9995 m by a thousandth of the variance too large, at 0.99 m by a fiftieth;
-    /// beyond the form's pole there is nothing to say.
+    /// Eq. 1 is held constant below 1 m: the variance is too large by a thousandth at 0.9995 m and by a
+    /// fiftieth at 0.99 m. Beyond the form's pole it is undefined.
     #[test]
     fn a_model_says_nothing_where_its_edge_is_not_its_form() {
         let beyond = |z, theta| is_beyond(&SigmaModel::paper(), z, theta);

@@ -1,4 +1,4 @@
-//! An entry of a model file, read as a term, has the parameters that were written.
+//! Terms read from entries of a model file have the parameters that were written.
 
 use nalgebra::DMatrix;
 use serde_json::json;
@@ -21,7 +21,7 @@ fn reach() -> Extent {
     Extent { disparity, z, theta: unit, light: unit, ambient: unit, ..Extent::default() }
 }
 
-/// There and back: formula of the entry, then the parameters of the term.
+/// Round trip: formula of the entry, then the parameters of the term.
 #[test]
 fn what_is_known_is_told_with_the_same_numbers() {
     let camera = kinect_v1(1).camera;
@@ -67,7 +67,7 @@ fn known_vignetting_grows_as_the_catalogue_says() {
     }
 }
 
-/// What has no formula is known by name alone; a shape of its own comes before the formula.
+/// An effect without a formula is known by name only; an entry's own shape takes precedence over the formula.
 #[test]
 fn what_has_no_formula_is_known_by_name() {
     let camera = kinect_v1(1).camera;

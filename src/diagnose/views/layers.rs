@@ -1,4 +1,4 @@
-//! The layers a mismatch may sit in: the mean, and the size of the noise.
+//! The layers a mismatch may be in: the mean, and the size of the noise.
 
 use std::sync::Arc;
 
@@ -20,40 +20,39 @@ use crate::sensors::SensorKind;
 use crate::stats::{Correlation, median};
 use crate::terms::{Extent, PixelContext, Term};
 
-/// The tiles of all views, with how much each view is worth.
+/// The tiles of all views, with each view's weight.
 pub struct Survey {
     pub views: Vec<SurveyedView>,
     pub reach: Extent,
-    /// Where every view states how flat its target is: the least flat of them.
+    /// The least flat target, where every view states its target's flatness.
     pub flat: Option<Flat>,
-    /// Of the camera.
+    /// Kind of the camera.
     pub kind: Option<SensorKind>,
-    /// Variance of what each pixel errs by in every view alike, px^2.
+    /// Variance of the fixed-pattern noise: the error each pixel has in all views, px^2.
     pub fixed_px2: f64,
     pub light: Light,
-    /// Side of the blocks that the size of the noise is measured on, in tiles.
+    /// Side of the blocks on which the noise is measured, in tiles.
     pub block_tiles: usize,
-    /// Blocks fall into parts by their light; those of two recordings that are compared do not.
+    /// Whether blocks are split by light; not when two recordings are compared.
     pub by_light: bool,
-    /// How well the size of the noise is known from view to view beforehand, in log variance.
+    /// Prior standard deviation of the noise level from view to view, in log variance.
     pub tolerance: f64,
-    /// Sigma was calibrated on these very views: it is refitted beside every hypothesis.
+    /// Whether sigma was calibrated on these very views and is therefore refitted with every hypothesis.
     pub refits_sigma: bool,
-    /// Views that the model's bias, and its sigma, were learnt from, where these are others.
+    /// Views that the model's bias and its sigma were learnt from, where they differ from these.
     pub learnt_from: [Option<Learnt>; 2],
-    /// What single views differ from the model by, one standard deviation a term: of the mean, and of
-    /// the variance.
+    /// Scatter of single views about the model, one standard deviation a term: of the mean, of the variance.
     pub between: Arc<[Vec<Term>; 2]>,
     pub ablation: Ablation,
 }
 
-/// Fewer independent samples do not show how they hang together: a correlation of so many errs by a
-/// tenth, and what a view's mean took with it makes it look shorter.
+/// Fewest independent samples for a view's own correlation estimate. The standard error is then a tenth, and
+/// subtracting the view's mean makes the correlation look shorter.
 const FEW_SAMPLES: f64 = 100.0;
 
-/// What the views' means are worth, and how their pixels hang together, with this bias taken out. The
-/// views of one sensor are matched by one window: a view too small to show it has at least the middle one
-/// of the larger half of the views.
+/// Inflation of the views' means and correlation of their pixels, with this bias subtracted. All views of a
+/// sensor share one matching window, so a view too small to show it gets at least the median of the larger
+/// half of the views.
 fn inflations(fields: &[Field], bias: &[Vec<f32>]) -> Vec<(f64, Correlation)> {
     let of = |(n, f): (usize, &Field)| inflation(f, bias.get(n).map_or(&[], |b| &b[..]));
     let mut all: Vec<(f64, Correlation)> = fields.par_iter().enumerate().map(of).collect();
@@ -126,23 +125,23 @@ impl Survey {
         }
     }
 
-    /// Two recordings are compared block by block, in the widest blocks and wherever light falls.
+    /// Prepares the comparison of two recordings: widest blocks, not split by light.
     pub fn compared(&mut self) {
         (self.block_tiles, self.by_light) = (BLOCK_TILES, false);
     }
 
-    /// The views' mean residuals, about a plane of their own each.
+    /// Mean residuals of the views, each about a plane of its own.
     pub fn mean_data(&self) -> Vec<ViewData> {
         self.views.par_iter().map(|v| mean_data(v).beside(&self.between[0])).collect()
     }
 
-    /// The same in larger patches.
+    /// Same as [`Survey::mean_data`], in larger patches.
     pub fn coarse_mean_data(&self) -> Vec<ViewData> {
         let coarse = |v| coarser(&mean_data(v), COARSE_PX).beside(&self.between[0]);
         self.views.par_iter().map(coarse).collect()
     }
 
-    /// The views at these places. Nobody asks how sure a search of them is, nor whether halves agree.
+    /// Survey of the views with these indices. Its searches are not tested for significance or replication.
     pub fn subset(&self, which: &[usize]) -> Survey {
         let of = |n: &usize| SurveyedView { in_second_half: false, ..self.views[*n].clone() };
         let views: Vec<SurveyedView> = which.iter().map(of).collect();
@@ -150,8 +149,8 @@ impl Survey {
         Survey { views, reach, between: self.between.clone(), ..*self }
     }
 
-    /// Measure anew what the views' means are worth, with what was found of the bias taken out, px
-    /// by view and pixel. `false`, and nothing is changed, where that changes little.
+    /// Measures the inflation of the views' means again with the bias found subtracted, px by view and pixel.
+    /// Returns `false` and changes nothing where the effect is small.
     pub fn reweigh(&mut self, fields: &[Field], bias: &[Vec<f32>]) -> bool {
         const LITTLE: f64 = 1.3;
         let anew = inflations(fields, bias);
@@ -169,20 +168,20 @@ impl Survey {
         true
     }
 
-    /// What each view's mean is worth as a whole, 1/px^2, and how its pixels hang together.
+    /// Total weight of each view's mean, 1/px^2, and the correlation of its pixels.
     pub fn weights(&self) -> Vec<(f64, Correlation)> {
-        // What rows take of it is found again.
+        // The loss due to row noise is estimated again.
         let weight = |v: &SurveyedView| v.whole_weight() * v.row_inflation;
         self.views.iter().map(|v| (weight(v), v.correlation.clone())).collect()
     }
 
-    /// Views are worth as much as this where that is more.
+    /// Raises the views' weights to at least these.
     pub fn weigh_more(&mut self, weights: Vec<(f64, Correlation)>) {
         self.views.iter_mut().zip(weights).for_each(|(view, weight)| view.weigh_more(weight));
     }
 
-    /// Noise is what changes from frame to frame; `common` is the correlation of two frames of a
-    /// view that comes from noise, by lag.
+    /// Measures the noise by the differences between frames. `common` is the noise correlation between two
+    /// frames of a view, by lag.
     pub fn compare_frames(&mut self, fields: &[Field], common: [f64; 3]) {
         for (view, field) in self.views.iter_mut().zip(fields) {
             let n = field.frames.len();
@@ -202,9 +201,9 @@ impl Survey {
         }
     }
 
-    /// With what is known of the mean taken out of what the noise is measured on, view by view
-    /// and pixel by pixel, px; and with variance that has another name already, px^2, or is
-    /// stretched by a factor with the measurement itself.
+    /// Subtracts the known bias (px, by view and pixel) before the noise is measured. Scales the expected
+    /// variance by `stretch`, a factor on the measurement itself, and adds `extra`, the variance that has
+    /// another cause, px^2.
     pub fn roughen(
         &mut self,
         fields: &[Field],
@@ -225,17 +224,17 @@ impl Survey {
         });
     }
 
-    /// Log variance over the model's, block by block.
+    /// Log ratio of the measured variance to the model's, block by block.
     pub fn variance_data(&self) -> Vec<ViewData> {
         let of = |v: &SurveyedView| blocks(v, self.block_tiles, self.by_light);
         let blocks: Vec<ViewData> = self.views.par_iter().map(of).collect();
-        // A view's level is as uncertain as views scatter.
+        // The prior variance of a view's level is the scatter of the views.
         let precision = vec![1.0 / view_scatter(&blocks, self.tolerance)];
         let held = |b| ViewData { precision: precision.clone(), ..b };
         blocks.into_iter().map(|b| held(b).beside(&self.between[1])).collect()
     }
 
-    /// Which half each view is in.
+    /// Whether each view is in the second half.
     pub fn second(&self) -> Vec<bool> {
         self.views.iter().map(|v| v.in_second_half).collect()
     }
@@ -248,7 +247,7 @@ mod tests {
     use crate::rng::{Seed, Stream};
     use crate::stats::noise_through_boxes;
 
-    /// The mean of a target of this size, its noise through boxes of `side` px.
+    /// Mean of a target of this size, white noise smoothed by boxes of `side` px.
     fn field([width, height]: [usize; 2], side: usize, rng: &mut Stream) -> Field {
         let noise = noise_through_boxes([width, height], side, rng);
         let n = width * height;
@@ -261,7 +260,7 @@ mod tests {
         }
     }
 
-    /// Of 22 x 16 px alone a box of nine looks like one of six; a view that shows its own keeps it.
+    /// On 22 x 16 px alone a box of 9 px looks like one of 6 px; a view that shows its own window keeps it.
     #[test]
     fn a_view_too_small_to_show_a_window_has_that_of_the_others() {
         let mut rng = Seed(1).stream("layers/window");

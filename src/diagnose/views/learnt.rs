@@ -1,4 +1,4 @@
-//! The other views that a model was learnt from: what they could not settle is no finding.
+//! The other views a model was learnt from: what they left uncertain is no finding.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -6,39 +6,38 @@ use super::known::KnownTerms;
 use crate::diagnose::options::DiagnoseOptions;
 use crate::model::NoiseModel;
 
-/// Views that taught a model, where they are not the ones that are looked at.
+/// Views a model was learnt from, where they are not the ones under diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt {
     pub views: f64,
-    /// Everything was looked for in them, and what was found is in the model.
+    /// Whether a full search was run on them, with all findings in the model.
     pub searched: bool,
 }
 
 impl Learnt {
-    /// Views that sigma was fitted to, or that a diagnosis searched; `None` where the model names
-    /// none.
+    /// Views that sigma was fitted to, or that a diagnosis searched; `None` where the model states none.
     pub fn of(model: &NoiseModel) -> Option<Self> {
         let (fit, searched) = (model.fit.views, model.fit.searched);
         let views = searched.map_or(fit, |s| s.views);
         (views > 0).then_some(Learnt { views: views as f64, searched: searched.is_some() })
     }
 
-    /// The same for the distances that were measured by other means.
+    /// Same for reference distances measured by other means.
     pub fn references(model: &NoiseModel) -> Option<Self> {
         let references = model.fit.searched.map_or(0, |s| s.references);
         (references > 0).then_some(Learnt { views: references as f64, searched: true })
     }
 
-    /// Variance of the difference of `views` and the model, over the variance of the views alone: the model's
-    /// own is one over its views.
+    /// Ratio of the variance of the difference between `views` and the model to the variance of the views
+    /// alone; the model's own variance is one over its views.
     pub fn of_difference(&self, views: f64) -> f64 {
         1.0 + views / self.views
     }
 
-    /// How much further than by their own error so many `views` may be off, in variance, once the model's
-    /// error was taken out of them by its covariance. What the model has not was looked for, and may be just too
-    /// small to be seen there: in amplitudes, with the threshold of both at one, sqrt(views / its views);
-    /// beyond it stands a difference of two measurements. A model that nobody searched leaves nothing open.
+    /// Variance inflation of so many `views` about the model, once the model's stated error has been
+    /// absorbed by its covariance. An effect that is not in the model may be just below the threshold of
+    /// its search: in units of the threshold here, an amplitude of sqrt(views / its views). The standard
+    /// deviation of the difference of two measurements adds to it. 1 for a model that was never searched.
     pub fn excess(&self, views: f64) -> f64 {
         if !self.searched {
             return 1.0;
@@ -46,8 +45,8 @@ impl Learnt {
         ((views / self.views).sqrt() + self.of_difference(views).sqrt()).powi(2)
     }
 
-    /// A chance of `views` that counted noise alone, as one of noise and of what a search of the
-    /// others may have left; a model that nobody searched for it says nothing of it.
+    /// Converts a p-value of `views` under noise alone into one that allows for effects the model's search
+    /// may have missed. Unchanged for a model that was never searched.
     pub fn p(&self, p: f64, views: f64) -> f64 {
         let normal = Normal::standard();
         let deviations = -normal.inverse_cdf(p);
@@ -55,7 +54,7 @@ impl Learnt {
     }
 }
 
-/// Views that the model's bias, and its sigma, were learnt from, where these are others.
+/// Views that the model's bias and its sigma were learnt from, where they differ from these.
 pub fn learnt_from(
     model: &NoiseModel,
     known: &KnownTerms,
@@ -71,8 +70,8 @@ pub fn learnt_from(
 mod tests {
     use super::*;
 
-    /// Against any number of views that taught the model, two measurements at most; against as many
-    /// as are looked at, what was just not seen there counts too.
+    /// With as many model views as new ones, the difference has twice the variance, and effects just below
+    /// the model's threshold add to that.
     #[test]
     fn few_views_leave_more_open() {
         let learnt = |views: f64, searched| Learnt { views, searched };

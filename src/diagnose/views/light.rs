@@ -1,4 +1,4 @@
-//! Infrared amplitudes as the light of surfaces.
+//! Converts infrared amplitudes into the light of surfaces.
 
 use std::sync::Arc;
 
@@ -7,16 +7,16 @@ use super::surveyed_view::SurveyedView;
 use crate::stats::median_in_place;
 use crate::terms::PixelContext;
 
-/// How infrared amplitudes become the light of surfaces.
+/// Conversion of infrared amplitudes into the light of surfaces.
 #[derive(Debug, Clone, Copy)]
 pub struct Light {
-    /// Of the recording, in the image's own units; 0 where there is no infrared.
+    /// Median light of the recording, in the image's own units; 0 where there is no infrared.
     median: f64,
     ambient_share: f64,
 }
 
 impl Light {
-    /// Of a single pixel.
+    /// Light of a single pixel over the recording's median; 1 where unknown.
     pub fn of(&self, field: &Field, k: usize, p: &PixelContext) -> f64 {
         let Some(&light) = field.light.get(k) else { return 1.0 };
         let own = f64::from(light) / (1.0 + self.ambient_share * p.ambient * p.pattern_fall_off());
@@ -24,7 +24,7 @@ impl Light {
     }
 }
 
-/// Light in units of the recording's median, what the room adds taken out.
+/// Removes the room's light and divides the views' light by the recording's median.
 pub fn relative_light(views: &mut [SurveyedView]) -> Light {
     let share = ambient_share(views);
     let mut all: Vec<f32> = Vec::new();
@@ -43,8 +43,8 @@ pub fn relative_light(views: &mut [SurveyedView]) -> Light {
     Light { median: if usable { median } else { 0.0 }, ambient_share: share }
 }
 
-/// Light of the room in the infrared image, a lux over the pattern at 1 m: amplitude times the
-/// pattern's fall-off f is a (1 + share lux f), a line through the views' medians.
+/// Light of the room in the infrared image, per lux, relative to the pattern at 1 m. Amplitude times the
+/// pattern's fall-off f is a (1 + share lux f), fitted as a line through the views' medians.
 fn ambient_share(views: &[SurveyedView]) -> f64 {
     let points: Vec<(f64, f64)> = views
         .iter()
@@ -60,7 +60,7 @@ fn ambient_share(views: &[SurveyedView]) -> f64 {
     if points.len() < 4 {
         return 0.0;
     }
-    // Errors are shares of the light.
+    // Errors are proportional to the light.
     let n: f64 = points.iter().map(|p| p.1.powi(-2)).sum();
     let (x0, y0) = points.iter().fold((0.0, 0.0), |(x, y), p| {
         let w = p.1.powi(-2) / n;

@@ -1,11 +1,11 @@
-//! Columns and rows at the picture's border that answer in no view: the sensor sees less than its
-//! image has room for. A Kinect v1 leaves eight columns on the right empty, which no window reaches.
+//! Border columns and rows that are empty in all views because the sensor does not fill its image. A
+//! Kinect v1 leaves eight columns on the right empty, which no matching window reaches.
 
 use super::field::Field;
 use super::tiles::SIDE;
 use crate::terms::PixelContext;
 
-/// First and last column, and first and last row, that answer.
+/// First and last column, and first and last row, with measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Margins {
     columns: [usize; 2],
@@ -13,10 +13,10 @@ pub struct Margins {
     size: [usize; 2],
 }
 
-/// A line is empty when so many readings of the target were asked of it in vain: with nine of ten
-/// lost for another reason, one in 10^4 of such lines would be.
+/// Least number of target readings, all missing, for a line to count as empty. With nine in ten readings lost
+/// for another reason, one such line in 10^4 would count.
 const ASKED: usize = 100;
-/// A wider margin than this share of the picture is no sensor's, and is told as a loss.
+/// Widest margin of a sensor, as a share of the picture; a wider one is reported as a loss.
 const WIDEST: f64 = 1.0 / 16.0;
 
 impl Margins {
@@ -36,7 +36,7 @@ impl Margins {
         Margins { columns, rows, size }
     }
 
-    /// Is the whole tile at this place where the sensor answers?
+    /// Whether the whole tile at this place lies where the sensor measures.
     pub fn hold(&self, place: &PixelContext) -> bool {
         let half = 0.5 * SIDE as f64;
         let inside = |at: f64, [first, last]: [usize; 2]| {
@@ -45,7 +45,7 @@ impl Margins {
         inside(place.u, self.columns) && inside(place.v, self.rows)
     }
 
-    /// Does the sensor answer there?
+    /// Whether the pixel lies where the sensor measures.
     pub fn hold_pixel(&self, column: usize, row: usize) -> bool {
         let inside = |at: usize, [first, last]: [usize; 2]| (first..=last).contains(&at);
         inside(column, self.columns) && inside(row, self.rows)
@@ -67,7 +67,7 @@ impl Margins {
     }
 }
 
-/// First and last line that answer, by what each was asked and answered.
+/// First and last line with measurements, from the readings asked for and measured in each.
 fn seen(lines: &[[usize; 2]]) -> [usize; 2] {
     let n = lines.len();
     let empty = |line: &&[usize; 2]| line[0] >= ASKED && line[1] == 0;

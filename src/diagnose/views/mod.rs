@@ -1,4 +1,4 @@
-//! The views as they are looked at: residuals about planes, tiles, blocks, and what is known of them.
+//! The views as the searches see them: residuals about planes, tiles and blocks, and the known terms.
 
 pub mod between;
 pub mod blocks;

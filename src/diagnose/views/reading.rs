@@ -1,4 +1,4 @@
-//! The views as fields of residuals: read, checked, and none of them twice.
+//! Reads the views as fields of residuals, checks them and drops duplicates.
 
 use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 
@@ -17,22 +17,22 @@ use crate::model::NoiseModel;
 use crate::terms::{Axis, PixelContext, Pixels, Statistic, Term};
 use crate::view::{Excluded, Recording, take_out_copies};
 
-/// What could be read of a recording.
+/// The usable views of a recording.
 pub(in crate::diagnose) struct LoadedViews<'a> {
     pub fields: Vec<Field>,
     pub excluded: Vec<Excluded>,
-    /// The words turned out to be ranges.
+    /// Finding that the raw values are ranges, not depths.
     pub ranges: Option<Finding>,
-    /// What the fields were read with.
+    /// Workbench the fields were read with.
     pub bench: Workbench<'a>,
-    /// What was taken out of them.
+    /// Known terms that were subtracted from them.
     pub known: KnownTerms,
-    /// Views that were another's copy, in words.
+    /// Remarks on views that were copies of another.
     pub copies: Vec<String>,
 }
 
 impl<'a> LoadedViews<'a> {
-    /// Every view that can be used, one at least of each.
+    /// Reads every view that can be used; of identical views one is kept.
     ///
     /// # Errors
     /// When fewer than three views are left.
@@ -45,7 +45,7 @@ impl<'a> LoadedViews<'a> {
         let mut known = KnownTerms::of(model, &bench.sensor.camera);
         bench.ray_share = known.ray_share().clamp(0.0, 1.0);
         let (mut fields, mut excluded) = read(recording, &bench, model, &known, progress);
-        // A model may be wrong about its ranges.
+        // The model may be wrong in taking the raw values for ranges.
         if bench.ray_share > 0.0 && fields.len() < recording.views.len() {
             let plain = Workbench::new(bench.sensor, bench.options);
             let as_depths = read(recording, &plain, model, &known, &|_, _| ());
@@ -75,7 +75,7 @@ impl<'a> LoadedViews<'a> {
     }
 }
 
-/// A view whose frames are bit-identical to another's is a duplicate and is dropped.
+/// Drops views whose frames are bit-identical to another's and returns a remark on each.
 fn without_copies(fields: &mut Vec<Field>) -> Vec<String> {
     let copies = take_out_copies(fields, |a, b| {
         a.words.0 == b.words.0
@@ -94,15 +94,15 @@ fn bits(residuals: &[f32]) -> Vec<u32> {
     residuals.iter().map(|r| r.to_bits()).collect()
 }
 
-/// Views that can be used, and those that cannot.
+/// Usable views, and the excluded ones.
 type Read = (Vec<Field>, Vec<Excluded>);
 
-/// By the exact test of McNemar, below this ranges are the better reading: five views that are flat
-/// so, and none that are flat as depths alone. Nothing else we know of makes a plane of what is none.
+/// Level of the exact McNemar test for reading raw values as ranges: reached by five views that are flat only
+/// as ranges and none that are flat only as depths. No other known cause turns a non-plane into a plane.
 const RANGES_LEVEL: f64 = 0.05;
 
-/// Do the views become flat once their words are taken for lengths of rays? Then with them, and with
-/// the chance of it were either reading as good as the other.
+/// Tests whether the views become flat once their raw values are read as ranges. If so, returns them read
+/// that way, with the p-value under both readings being equally good.
 fn as_ranges(
     recording: &Recording,
     bench: &Workbench<'_>,
@@ -132,14 +132,14 @@ fn as_ranges(
     (p <= RANGES_LEVEL && none_left()).then_some(((fields, excluded), p))
 }
 
-/// Raw values hold ranges or depths: where fields that were read as ranges are off by more than this share
-/// of the difference, something else bends the planes. Simulated ranges leave less than 1e-4, a lens of
-/// k1 = 0.05 beside them 0.007, 0.87 of ranges 0.12.
+/// Largest share of the range-depth difference that may remain once raw values are read as ranges; beyond it
+/// something else bends the planes. Simulated ranges leave less than 1e-4, with a lens of k1 = 0.05 as well
+/// 0.007, and 0.87 of ranges 0.12.
 const PART_OF_RANGES: f64 = 0.05;
-/// Pixels of a view from one that is looked at to the next.
+/// Step between the pixels that are looked at.
 const STRIDE: usize = 61;
 
-/// What the fields' means still have of ranges in place of depths, beside a plane of each view's own.
+/// Share of the range-depth difference left in the fields' means, fitted together with a plane per view.
 fn share_left(fields: &[Field], bench: &Workbench<'_>) -> Option<f64> {
     let of_view = |f: &Field| {
         let pixels = Pixels::new(&bench.sensor.camera, &bench.rays, f.scale_px_m);

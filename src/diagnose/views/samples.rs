@@ -1,4 +1,4 @@
-//! The samples that a search works on.
+//! The samples a search works on.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,20 +13,20 @@ use crate::terms::{PixelContext, Term};
 /// One view's samples.
 #[derive(Clone, Default)]
 pub struct ViewData {
-    /// Shared by what is looked for at the same places.
+    /// Shared by all data at the same places.
     pub places: Arc<Vec<PixelContext>>,
     pub response: Vec<f64>,
     pub weight: Vec<f64>,
     /// Row-major, as many columns as `precision` has entries.
     pub nuisance: Vec<f64>,
-    /// Holds each nuisance to zero; 0 leaves it free.
+    /// Prior precision of each nuisance about zero; 0 leaves it free.
     pub precision: Vec<f64>,
-    /// For larger patches: which of them each sample of the finer data went to.
+    /// For larger patches: index of the patch that each finer sample went to.
     pub gathered: Vec<u32>,
 }
 
 impl ViewData {
-    /// The weighted rows of a `response` at these places, the view's nuisances beside it.
+    /// Weighted rows of a `response` at these places, with the view's nuisances.
     pub fn rows(&self, response: &[f64]) -> Option<Rows<'_>> {
         Rows::new(response, &self.weight, &self.nuisance, self.precision.len(), &self.precision)
     }
@@ -37,20 +37,20 @@ impl ViewData {
         plane_through(points.map(|((p, y), w)| ([p.x, p.y], *y, *w)))
     }
 
-    /// Weighted mean of the response, and the weight of all samples.
+    /// Weighted mean of the response, and the total weight.
     pub fn level(&self) -> Option<(f64, f64)> {
         let weight: f64 = self.weight.iter().sum();
         let sum: f64 = self.response.iter().zip(&self.weight).map(|(y, w)| w * y).sum();
         (weight > 0.0).then(|| (sum / weight, weight))
     }
 
-    /// The response, these terms taken out.
+    /// Response with these terms subtracted.
     pub fn without(&self, terms: &[Term]) -> Vec<f64> {
         let samples = self.response.iter().zip(self.places.iter());
         samples.map(|(y, place)| y - Term::sum(terms, place)).collect()
     }
 
-    /// With these terms beside the view's own nuisances: each is there by a standard normal number.
+    /// Adds these terms to the view's nuisances, each with a standard normal amplitude.
     pub fn beside(mut self, terms: &[Term]) -> Self {
         if terms.is_empty() {
             return self;
@@ -73,17 +73,17 @@ pub fn finite(v: f64) -> f64 {
 /// Side of a larger patch, px: two tiles.
 pub const COARSE_PX: f64 = (2 * SIDE) as f64;
 
-/// So many of the patches that smooth shapes are looked for on lie across the picture: in the 320 px that
-/// the proof's pictures have they are two tiles wide.
+/// Number of patches across the picture when searching smooth shapes. In the proof's pictures, 320 px wide, a
+/// patch is then two tiles wide.
 const PATCHES_ACROSS: usize = 40;
 
-/// Side of these patches in a picture this wide, px: whole tiles.
+/// Side of these patches in a picture `width` px wide: whole tiles, px.
 pub fn smooth_px(width: usize) -> f64 {
     ((width / PATCHES_ACROSS / SIDE * SIDE) as f64).max(COARSE_PX)
 }
 
-/// The places of each patch of this side, px, row by row; what is to lie `apart` is in patches of its own, and
-/// `None` in none.
+/// Indices of the places in each patch of this side (px), row by row. Places with different keys `apart` go
+/// to separate patches; those without a key go to none.
 pub fn in_patches<K: Ord>(
     places: &[PixelContext],
     side: f64,
@@ -98,7 +98,7 @@ pub fn in_patches<K: Ord>(
     patches.into_values().collect()
 }
 
-/// Tiles made one in patches of this side, px.
+/// Averages tiles over patches of this side, px.
 pub fn coarser(fine: &ViewData, side: f64) -> ViewData {
     let p = fine.precision.len();
     let groups = in_patches(&fine.places, side, |_| Some(()));

@@ -1,4 +1,4 @@
-//! One view as the searches see it: its tiles, and how much they are worth.
+//! One view as the searches see it: its tiles and their weights.
 
 use std::sync::Arc;
 
@@ -10,35 +10,35 @@ use crate::diagnose::noise::texture::{same_pixel, without_bias};
 use crate::stats::{Correlation, measure_correlation};
 use crate::terms::PixelContext;
 
-/// A view, thinned.
+/// A view reduced to tiles.
 #[derive(Clone)]
 pub struct SurveyedView {
     pub name: String,
-    /// Shared, as the tiles are, by the surveys of a part of the views, and by all samples.
+    /// Shared, like the tiles, by surveys of a subset of the views and by all samples.
     pub places: Arc<Vec<PixelContext>>,
-    /// One at each place.
+    /// One per place.
     pub tiles: Arc<Vec<Tile>>,
     /// Variance of a pixel's mean in units of the model's, times pixels per independent sample.
     pub inflation: f64,
     pub correlation: Correlation,
-    /// Independent frames a view's variance is worth.
+    /// Effective number of independent frames for the view's variance.
     pub frames: f64,
-    /// How many times more uncertain the logarithm of its variance is than by that.
+    /// Further inflation of the variance of its log variance.
     pub log_variance_inflation: f64,
-    /// By how much more the mean's variance exceeds that, as whole rows err as one.
+    /// Further inflation of the mean's variance by errors common to whole rows.
     pub row_inflation: f64,
-    /// What these rows alone make of the correlation's sum.
+    /// Sum of the correlation due to these row errors alone.
     pub row_correlation: f64,
-    /// What the variance between frames is to be multiplied by to be all of the noise's; `None`
-    /// with a single frame.
+    /// Factor from the variance between frames to the full noise variance; `None` with a single frame, or
+    /// where frames share nearly all of their noise.
     pub between_frame_factor: Option<f64>,
-    /// In the second of the halves that a finding must replicate in.
+    /// Whether it is in the second of the halves that a finding must replicate in.
     pub in_second_half: bool,
 }
 
-/// How much less a pixel's mean is worth than the model says: its variance relative to the
-/// model's, and how many pixels make one independent sample. Measured on what is left after a
-/// smooth error, and what is known of the bias (px, by pixel, or empty), is taken out.
+/// Inflation of the variance of a pixel's mean: its ratio to the model's, times the pixels per independent
+/// sample; and the pixels' correlation. Measured after subtracting smooth errors and the known bias (px, by
+/// pixel, or empty).
 pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
     let rough = whitened_high_passed(&without_bias(&field.mean, bias), field);
     let (mut sum, mut n) = (0.0, 0.0);
@@ -51,16 +51,17 @@ pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
     (inflation, correlation)
 }
 
-/// Whitened residuals as an image, without what is smooth.
+/// Whitened and high-passed residuals as an image.
 fn whitened_high_passed(residuals: &[f32], field: &Field) -> Vec<f32> {
     let mut whitened: Vec<f32> = residuals.iter().zip(&field.sigma).map(|(r, s)| r / s).collect();
-    // Where the box is not small beside the target it leaves most of a bowl, which would count as noise that hangs
-    // together: the stronger, the less of it would be seen.
+    // On a target not much larger than the box, the high-pass leaves most of a bowl. It would count as
+    // correlated noise: the stronger the bowl, the less of it would be detected.
     take_out_cubic(&mut whitened, &field.pixels, field.width);
     field.high_passed(&whitened)
 }
 
-/// F frames whose noise is the same by a share rho are worth 1 / (rho^2 + (1 - rho^2) / F).
+/// Effective number of independent frames: 1 / (rho^2 + (1 - rho^2) / F) for F frames whose noise has the
+/// correlation rho.
 pub fn independent_frames(field: &Field) -> f64 {
     let [first, second, ..] = field.first.as_slice() else { return 1.0 };
     let rho = same_pixel(&whitened_high_passed(first, field), &whitened_high_passed(second, field));
@@ -69,23 +70,23 @@ pub fn independent_frames(field: &Field) -> f64 {
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)
 }
 
-/// By how much the mean disparity is off where the noise is Gaussian in the depth, px: the mean of an
-/// inverse, at second order. As large as the noise is beside the distance: in four metres a hundredth
-/// of the noise, and bent as a tilted target lies.
+/// Bias of the mean disparity where the noise is Gaussian in depth, px: the mean of an inverse, to second
+/// order. Relative to the noise it is noise over distance, a hundredth at 4 m, and it is curved across a
+/// tilted target.
 fn mean_off(p: &PixelContext) -> f64 {
     p.variance / p.disparity
 }
 
-/// What a view's mean may be off by for itself: a plane, and a [`mean_off`].
+/// Nuisances of a view's mean: a plane, and a [`mean_off`].
 pub fn mean_nuisance(p: &PixelContext) -> [f64; 4] {
     [1.0, p.x, p.y, finite(mean_off(p))]
 }
 
-/// What holds each of these. Where the noise is Gaussian is not known; the last is so wide that twenty
-/// views which err alike by one cost a nat together.
+/// Prior precision of each of these. Whether the noise is Gaussian in depth is not known, so the last prior
+/// is wide: twenty views that are all off by one cost a nat together.
 pub const MEAN_PRECISION: [f64; 4] = [0.0, 0.0, 0.0, 0.1];
 
-/// The means, about a plane of the view's own.
+/// Mean residuals, about a plane of the view's own.
 pub fn mean_data(view: &SurveyedView) -> ViewData {
     let tiles = &view.tiles;
     ViewData {
@@ -104,13 +105,13 @@ impl SurveyedView {
         finite(tile.pixels / tile.variance / self.inflation / self.row_inflation)
     }
 
-    /// Of all tiles together.
+    /// Weight of all tiles together.
     pub fn whole_weight(&self) -> f64 {
         self.tiles.iter().map(|t| self.weight(t)).sum()
     }
 
-    /// Variance of a pixel's noise, as its frames differ, over the model's; `None` where no frames tell. Tiles of
-    /// which the model says nothing have no say.
+    /// Ratio of a pixel's noise variance, measured between frames, to the model's; `None` without frames to
+    /// compare. Tiles of which the model says nothing are ignored.
     pub fn noise_by_frames(&self) -> Option<f64> {
         let told = || self.tiles.iter().filter(|t| t.temporal.is_finite());
         let sum = |of: fn(&Tile) -> f64| told().map(|t| t.pixels * of(t)).sum::<f64>();
@@ -118,8 +119,8 @@ impl SurveyedView {
         (ratio > 0.0).then_some(ratio)
     }
 
-    /// Raise the weight of all tiles together to at least this, and take its correlation over. Two runs'
-    /// inflations do not compare: each is relative to its own sigma.
+    /// Raises the total weight to this one if that is more, and takes over its correlation. The inflations of
+    /// two runs are not comparable: each is relative to its own sigma.
     pub fn weigh_more(&mut self, (weight, correlation): (f64, Correlation)) {
         let own = self.whole_weight();
         if weight > own && own > 0.0 {
@@ -133,12 +134,12 @@ impl SurveyedView {
         self.places.iter().zip(self.tiles.iter())
     }
 
-    /// The same with the tiles to be changed: the places stay shared.
+    /// Same with mutable tiles; the places stay shared.
     pub fn tiles_mut(&mut self) -> impl Iterator<Item = (&PixelContext, &mut Tile)> {
         self.places.iter().zip(Arc::make_mut(&mut self.tiles))
     }
 
-    /// Both to be changed.
+    /// Same with mutable places and tiles.
     pub fn patches_mut(&mut self) -> impl Iterator<Item = (&mut PixelContext, &mut Tile)> {
         Arc::make_mut(&mut self.places).iter_mut().zip(Arc::make_mut(&mut self.tiles))
     }
@@ -146,7 +147,7 @@ impl SurveyedView {
 
 #[cfg(test)]
 impl SurveyedView {
-    /// Of white noise, and nothing known beside.
+    /// View of white noise with unit inflations.
     pub fn white(patches: impl IntoIterator<Item = (PixelContext, Tile)>, frames: f64) -> Self {
         let (places, tiles): (Vec<_>, Vec<_>) = patches.into_iter().unzip();
         SurveyedView {
@@ -177,7 +178,7 @@ mod tests {
     use crate::simulate::kinect_v1;
     use crate::terms::{Basis, Coordinate, Modulation};
 
-    /// A tilted wall seen by a sensor of Eq. 1 whose noise is Gaussian in the depth, means without noise.
+    /// A tilted wall seen by a sensor of Eq. 1 whose noise is Gaussian in depth; the means are noise-free.
     fn view() -> SurveyedView {
         let sensor = kinect_v1(1);
         let (camera, scale) = (&sensor.camera, 43.5);
@@ -215,8 +216,8 @@ mod tests {
         SurveyedView::white(patches, 30.0)
     }
 
-    /// Of a sigma that was refitted to half of what it was, a view is worth as much as before; where what it
-    /// had not been told made it seem worth a third, it is worth what it was.
+    /// Halving sigma in a refit leaves a view's weight unchanged. An inflation raised threefold by an effect
+    /// missing from the model does not lower it.
     #[test]
     fn a_view_keeps_its_weight_whatever_sigma_is() {
         let first = view();
@@ -238,7 +239,7 @@ mod tests {
         );
     }
 
-    /// Noise that has another name is told from what is left; a mean is worth what it was in its own fit.
+    /// Noise with another named cause changes the log variance that is left, not the weights of the means.
     #[test]
     fn what_the_noise_is_held_against_does_not_weigh_the_means() {
         let first = view();
@@ -252,7 +253,7 @@ mod tests {
         }
     }
 
-    /// Twice the model's variance, as four frames show it, and a tile beyond the model.
+    /// Twice the model's variance in four frames, and a tile outside the model's domain.
     #[test]
     fn frames_tell_the_noise_where_the_model_says_something() {
         let mut view = SurveyedView { between_frame_factor: Some(4.0 / 3.0), ..view() };
@@ -263,7 +264,7 @@ mod tests {
         assert_eq!(view.noise_by_frames(), None);
     }
 
-    /// Planes alone leave of it what a bowl would be: a nat in each view, and views add up.
+    /// With planes alone it looks like a bowl: a nat in each view, and views add up.
     #[test]
     fn noise_that_is_gaussian_in_the_depth_is_no_bowl() {
         let data = mean_data(&view());
@@ -278,7 +279,7 @@ mod tests {
             precision: vec![0.0; 3],
             ..data.clone()
         };
-        // A Gaussian depth's disparity, drawn: its mean is off by as much, and upwards.
+        // The mean disparity of simulated Gaussian depths is too large by the same amount.
         let mut rng = Seed(1).stream("mean-off");
         let (z, sigma_m, mut sum) = (4.0, 0.2, 0.0);
         for _ in 0..200_000 {

@@ -1,21 +1,22 @@
-//! Large images looked at in part: memory goes with what is looked at.
+//! Subsamples large images to limit memory.
 //!
-//! Whole blocks are kept, for neighbours hang together: each is as it was, with the target's true edge.
+//! Whole blocks are kept because neighbouring pixels are correlated. Distances from the target's edge stay
+//! those of the full image.
 
 use super::field::Field;
 
-/// Pixels of an image that are all looked at; a Kinect has 0.3 megapixels, the largest time-of-flight
+/// Largest image that is used whole, pixels; a Kinect has 0.3 megapixels, the largest time-of-flight
 /// sensors one.
 const MAX_PIXELS: usize = 1 << 20;
-/// Side of a block, px: seven of the windows that matchers correlate over.
+/// Side of a block, px: seven matching windows.
 const BLOCK: usize = 64;
 
-/// Of so many blocks each way one is looked at, in images of this size; 1 where all are.
+/// Stride of the blocks used along either axis, for images of this many pixels; 1 where all are used.
 pub fn blocks_apart(pixels: usize) -> usize {
     (pixels.div_ceil(MAX_PIXELS) as f64).sqrt().ceil() as usize
 }
 
-/// What is not looked at, in words.
+/// Remark on the subsampling, if there is any.
 pub fn remark(width: usize, height: usize) -> Option<String> {
     let apart = blocks_apart(width * height);
     (apart > 1).then(|| {
@@ -27,8 +28,8 @@ pub fn remark(width: usize, height: usize) -> Option<String> {
 }
 
 impl Field {
-    /// Keep of the target's pixels, before anything is measured at them, those of the blocks that are looked
-    /// at; `expected` has a number a pixel.
+    /// Drops the target's pixels outside the blocks used, before anything is measured; `expected` has one
+    /// value per pixel. Drops none if no pixel would be left.
     pub(in crate::diagnose) fn subsample_blocks(&mut self, expected: &mut Vec<f32>) {
         let (width, height) = (self.width, self.height);
         let apart = blocks_apart(width * height);
@@ -68,7 +69,7 @@ mod tests {
         {
             assert_eq!(blocks_apart(width * height), apart, "{width} x {height}");
             assert_eq!(remark(width, height).is_some(), apart > 1);
-            // Blocks at the far side count too.
+            // Partial blocks at the far side count too.
             let kept = |side: usize| side.div_ceil(BLOCK).div_ceil(apart) * BLOCK;
             assert!(kept(width) * kept(height) <= MAX_PIXELS + MAX_PIXELS / 4);
         }

@@ -1,4 +1,4 @@
-//! Residuals thinned to tiles: what all searches work on.
+//! Residuals averaged over tiles, which all searches work on.
 
 use nalgebra::Vector3;
 
@@ -8,34 +8,33 @@ use crate::diagnose::noise::texture::high_passed;
 use crate::scene::TargetFrame;
 use crate::terms::{PixelContext, Pixels, corner_radius};
 
-/// What is measured in a patch of pixels; where it lies stands beside it, for all that look there to
-/// share.
+/// Measurements of a patch of pixels. Its place is stored separately so that it can be shared.
 #[derive(Debug, Clone, Copy)]
 pub struct Tile {
     /// Mean residual, px.
     pub mean: f64,
     /// Mean square of single frames' residuals, px^2.
     pub square: f64,
-    /// Mean square of the mean residual without what is smooth, px^2.
+    /// Mean square of the high-passed mean residual, px^2.
     pub rough_square: f64,
-    /// Mean variance of a pixel over the frames, px^2, as if it was measured in all of them.
+    /// Mean variance of a pixel over the frames, px^2, as if measured in all of them.
     pub temporal: f64,
-    /// Share of the frames' differences that were measured: less than one where readings are lost.
+    /// Share of the differences between frames that were measured; below one where readings are lost.
     pub repeated: f64,
     /// Model's variance of a pixel, px^2.
     pub variance: f64,
-    /// What its noise is held against, px^2: the same, until the noise's search puts in what has another name.
+    /// Expected variance of the noise, px^2: `variance` until the search of the noise adds named causes.
     pub noise_variance: f64,
     /// Pixels with a mean.
     pub pixels: f64,
-    /// Share of pixel-frames without a measurement, and their number.
+    /// Share of pixel-frames without a measurement, and the number of all pixel-frames.
     pub missing: f64,
     pub asked: f64,
 }
 
 #[cfg(test)]
 impl Tile {
-    /// Of white noise of this variance, px^2, all of it measured in every frame.
+    /// Tile of white noise of this variance, px^2, measured in every frame.
     pub fn of_noise(variance: f64, pixels: f64) -> Self {
         Tile {
             mean: 0.0,
@@ -56,8 +55,8 @@ impl Tile {
 /// still seen.
 pub const SIDE: usize = 4;
 
-/// What lies nearer the target's edge is kept apart: what a matcher's window of 9 px in 640 reaches, and no less
-/// than a tile, px.
+/// Width of the rim along the target's edge that is treated separately, px: the reach of a matching window of
+/// 9 px in 640, and at least a tile.
 pub fn rim_px(camera: &Camera) -> f64 {
     (camera.width as f64 / 80.0).max(SIDE as f64)
 }
@@ -69,7 +68,7 @@ pub struct Places<'a> {
     rays: &'a Rays,
     board: TargetFrame,
     corner: f64,
-    /// What is one for the view.
+    /// Values common to the whole view.
     view: PixelContext,
 }
 
@@ -96,7 +95,7 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// Of the pixel number `k` of the target; its variance is the field's.
+    /// Place of pixel number `k` of the target, with the field's variance.
     pub fn pixel(&self, k: usize) -> PixelContext {
         let i = self.field.pixels[k] as usize;
         let (u, v) = ((i % self.camera.width) as f64, (i / self.camera.width) as f64);
@@ -127,7 +126,7 @@ impl<'a> Places<'a> {
     }
 }
 
-/// The tiles of a view, and where each lies.
+/// Places and tiles of a view.
 pub fn tiles(
     field: &Field,
     camera: &Camera,
@@ -158,7 +157,7 @@ pub fn tiles(
         }
     }
     let held = || sums.iter().filter(|s| s.pixels > 0.0);
-    // No larger than they must be: with the places they are the most of a survey.
+    // Exact capacity: places and tiles are most of a survey's memory.
     let n = held().count();
     let mut patches: (Vec<PixelContext>, Vec<Tile>) =
         (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -183,7 +182,7 @@ struct Sums {
     /// Sum of squares over the frames, and its degrees of freedom.
     temporal: f64,
     repeats: f64,
-    /// One over the light: noise goes with it.
+    /// Sum of 1 / light; the noise scales with it.
     darkness: f64,
     variance: f64,
     asked: f64,
@@ -202,7 +201,7 @@ impl Sums {
         let (u, v) = (self.u / self.pixels, self.v / self.pixels);
         let place = places.at(u, v, places.camera.ray(u, v), self.edge / self.pixels);
         let variance = self.variance / self.pixels;
-        // A single reading differs from no other.
+        // A single reading has no differences.
         let asked = frames - 1.0;
         let (temporal, repeated) = if self.repeats > 0.0 {
             (self.temporal / self.repeats * asked / frames, self.repeats / (self.n * asked))
@@ -225,7 +224,7 @@ impl Sums {
     }
 }
 
-/// The target's own coordinates, begun at the centroid of its pixels.
+/// Coordinates on the target, with the origin at the centroid of its pixels.
 fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
     const ENOUGH: usize = 5000;
     let stride = (field.pixels.len() / ENOUGH).max(1);
@@ -237,7 +236,7 @@ fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
     TargetFrame::on(&field.plane, sum / few.len() as f64)
 }
 
-/// Measure the rough part of the mean, with what is known of it taken out, px by pixel (or empty).
+/// Measures the high-passed mean, with the known bias subtracted (px by pixel, or empty).
 pub fn roughen(tiles: &mut [Tile], places: &[PixelContext], field: &Field, bias: &[f32]) {
     let rough = high_passed(field, &field.mean, bias);
     let across = field.width.div_ceil(SIDE);

@@ -1,4 +1,4 @@
-//! Tiles whose readings are lost in part.
+//! Tiles with some readings lost.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -11,7 +11,7 @@ use crate::simulate::kinect_v1;
 const FRAMES: usize = 4;
 const SIGMA: f32 = 0.1;
 
-/// Of every pixel a share of the readings, the others lost at random.
+/// A field in which a share `kept` of every pixel's readings is kept; the others are lost at random.
 fn field(camera: &Camera, kept: f64) -> Field {
     let inside = |i: &u32| {
         let (u, v) = (*i as usize % camera.width, *i as usize / camera.width);
@@ -40,7 +40,7 @@ fn field(camera: &Camera, kept: f64) -> Field {
     field
 }
 
-/// The noise is as large as where nothing is lost, and counts for the pairs of readings there are.
+/// The noise is as large as where nothing is lost, and is weighted by the pairs of readings there are.
 #[test]
 fn lost_readings_make_the_noise_no_smaller() {
     let camera = kinect_v1(1).camera;
@@ -52,7 +52,7 @@ fn lost_readings_make_the_noise_no_smaller() {
             [square + counts * t.temporal, n + counts]
         });
         let unbiased = sums[0] / sums[1] * FRAMES as f64 / (FRAMES as f64 - 1.0);
-        // 40,000 pixels, a tenth of the pairs where a fifth of the readings is left.
+        // 40,000 pixels, with a tenth of the pairs where a fifth of the readings is left.
         let ratio = unbiased / f64::from(SIGMA).powi(2);
         assert!((ratio - 1.0).abs() < 0.05, "{kept}: {ratio}");
         // A pixel that is read n times has n - 1 differences.

@@ -1,20 +1,20 @@
-//! What the three formats of ROS have in common: topics, and messages that can be fetched by number.
+//! Common interface of the three ROS formats: topics, and messages fetched by number.
 
 use std::path::Path;
 
 use super::messages::Dialect;
 use crate::error::Result;
 
-/// Messages of these kinds are read; of others only the topic is known.
+/// Message types that are read; of others only the topic is known.
 pub const KINDS: [&str; 6] =
     ["Image", "CompressedImage", "CameraInfo", "Temperature", "Float32", "KeyValue"];
 
-/// A bag that was opened and whose messages can be fetched.
+/// An open bag whose messages can be fetched.
 pub trait Bag: std::fmt::Debug + Send + Sync {
     fn path(&self) -> &Path;
     fn topics(&self) -> &[Topic];
-    /// The first `limit` bytes of a message and how long it is.
-    /// An error when the file does not hold what its index says.
+    /// The first `limit` bytes of a message, and its length.
+    /// Fails if the file contradicts its index.
     fn message(&self, topic: usize, number: usize, limit: u64) -> Result<Message>;
 }
 
@@ -24,7 +24,7 @@ pub struct Topic {
     /// As in "sensor_msgs/Image", for both generations of ROS.
     pub kind: String,
     pub dialect: Dialect,
-    /// When each message was written, ns; empty for kinds that are not read.
+    /// Time at which each message was written, ns; empty for types that are not read.
     pub logged_ns: Vec<i64>,
 }
 
@@ -34,7 +34,7 @@ pub struct Message {
 }
 
 impl Topic {
-    /// Without its package: "Image".
+    /// Type without its package: "Image".
     pub fn short_kind(&self) -> &str {
         self.kind.rsplit('/').next().unwrap_or_default()
     }
@@ -44,7 +44,7 @@ impl Topic {
     }
 }
 
-/// "sensor_msgs/msg/Image" as "sensor_msgs/Image".
+/// Converts "sensor_msgs/msg/Image" to "sensor_msgs/Image".
 pub fn kind_of(name: &str) -> String {
     name.replacen("/msg/", "/", 1)
 }

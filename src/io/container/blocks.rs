@@ -1,4 +1,4 @@
-//! Pieces of a file: lengths checked against what is there, chunks decompressed and a few of them kept.
+//! Reads parts of a file: lengths checked against the file, chunks decompressed and a few cached.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -10,10 +10,10 @@ use crate::error::{Error, Result};
 
 const REMEDY: &str = "the file is damaged; copy or record it again";
 
-/// More is not held at once. Recorders write chunks of 1 to 4 MB, and of one image where that is larger.
+/// Largest piece held at once. Recorders write chunks of 1 to 4 MB, or of one image if that is larger.
 pub const MAX_PIECE: u64 = 256 << 20;
 
-/// A file read at places, from any thread.
+/// A file with random access from any thread.
 #[derive(Debug)]
 pub struct Source {
     pub path: PathBuf,
@@ -29,7 +29,7 @@ impl Source {
         Ok(Source { path: path.into(), file: Mutex::new(file), length })
     }
 
-    /// `n` bytes from `at`; `what` they are, for the error where the file ends before.
+    /// Reads `n` bytes from `at`; `what` names them in the error for a file that ends too early.
     pub fn bytes(&self, at: u64, n: u64, what: &str) -> Result<Vec<u8>> {
         if at.checked_add(n).is_none_or(|end| end > self.length) {
             let said = format!(
@@ -61,19 +61,19 @@ pub enum Compression {
     Zstd,
 }
 
-/// A stretch of a file that is compressed as one.
+/// A range of a file that is compressed as a unit.
 #[derive(Debug, Clone, Copy)]
 pub struct Chunk {
     pub at: u64,
-    /// Bytes in the file, and what they become.
+    /// Bytes in the file, and after decompression.
     pub stored: u64,
     pub size: u64,
     pub compression: Compression,
-    /// CRC-32 of what it becomes, where the format has one.
+    /// CRC-32 of the decompressed bytes, if the format has one.
     pub crc: Option<u32>,
 }
 
-/// Decompressed chunks that are kept: the threads of a machine walk through a few views at a time.
+/// Decompressed chunks kept: the threads of a machine walk through a few views at a time.
 const KEPT: usize = 8;
 
 #[derive(Debug)]
@@ -88,7 +88,8 @@ impl Chunks {
         Chunks { source, chunks: Vec::new(), kept: Mutex::default() }
     }
 
-    /// Its number. An error when it reaches beyond the file or claims more than any recorder writes.
+    /// Adds a chunk and returns its number. Fails if it exceeds the file or claims
+    /// more than any recorder writes.
     pub fn push(&mut self, chunk: Chunk) -> Result<usize> {
         let Chunk { at, stored, size, .. } = chunk;
         let source = &self.source;
@@ -107,7 +108,7 @@ impl Chunks {
         Ok(self.chunks.len() - 1)
     }
 
-    /// Bytes of a chunk, or of the file where it is in none.
+    /// Bytes of a chunk, or of the file itself without one.
     pub fn bytes_at(&self, chunk: Option<u32>, at: u64, n: u64, what: &str) -> Result<Vec<u8>> {
         match chunk {
             Some(chunk) => self.bytes(chunk as usize, at, n, what),
@@ -115,12 +116,12 @@ impl Chunks {
         }
     }
 
-    /// Before compression.
+    /// Decompressed size of a chunk.
     pub fn size(&self, number: usize) -> u64 {
         self.chunks[number].size
     }
 
-    /// Bytes of a chunk as it was before compression.
+    /// Bytes of a decompressed chunk.
     pub fn bytes(&self, number: usize, at: u64, n: u64, what: &str) -> Result<Vec<u8>> {
         let chunk = self.chunks[number];
         if at.checked_add(n).is_none_or(|end| end > chunk.size) {
@@ -158,7 +159,7 @@ impl Chunks {
     }
 }
 
-/// Exactly as many bytes as the chunk claims; memory grows with what is there, not with the claim.
+/// Decompresses a chunk to exactly its claimed size; memory grows with the actual data, not with the claim.
 fn decompress(stored: &[u8], chunk: Chunk) -> Result<Vec<u8>, String> {
     let whole = match chunk.compression {
         Compression::None => stored.to_vec(),
@@ -175,7 +176,7 @@ fn decompress(stored: &[u8], chunk: Chunk) -> Result<Vec<u8>, String> {
     Ok(whole)
 }
 
-/// At most `max` bytes: an error when there are more.
+/// Decompresses zstd data. Fails if they become more than `max` bytes.
 pub fn unzstd(stored: &[u8], max: u64) -> Result<Vec<u8>, String> {
     let reader = ruzstd::decoding::StreamingDecoder::new(stored).map_err(|e| e.to_string())?;
     all_of(reader, max)
@@ -190,7 +191,7 @@ fn all_of(reader: impl Read, max: u64) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Little-endian, of the first four bytes; 0 of fewer.
+/// The first four bytes as a little-endian number; 0 if there are fewer.
 pub fn word32(bytes: &[u8]) -> u32 {
     bytes.first_chunk().map_or(0, |b| u32::from_le_bytes(*b))
 }

@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 const REMEDY: &str =
     "give --intrinsics fx,fy,cx,cy in pixels, or record the camera_info that belongs to the topic";
 
-/// The camera that took images of `size` px on `depth`, and who says so; nothing where no topic does.
-/// An error when what is said does not belong to the images or is no camera.
+/// The camera of the images of `size` px on `depth`, and where it is described; `None` without a camera_info.
+/// Fails if the description does not fit the images or is not a valid camera.
 pub fn camera(
     bag: &dyn Bag,
     depth: usize,
@@ -32,7 +32,7 @@ pub fn camera(
         )));
     }
     let bent = info.distortion.iter().any(|&k| k != 0.0);
-    // Rectified images lie in P, and D is what was taken out of them.
+    // Rectified images follow P; D has been removed from them.
     let rectified = bent && name.contains("_rect") && info.rectified[0] > 0.0;
     let [fx, fy, cx, cy] = if rectified { info.rectified } else { info.intrinsics };
     let (distortion, said) = if rectified { (None, None) } else { lens(&info).map_err(wrong)? };
@@ -47,11 +47,11 @@ pub fn camera(
     }
 }
 
-/// The camera_info in the namespace of the images; nothing when there are two. Another camera's, a
-/// colour camera's say, would look as right.
+/// The camera_info topic in the namespace of the images, if there is exactly one. That of another camera,
+/// such as a colour camera, would look just as plausible.
 fn beside(topics: &[Topic], depth: &str) -> Option<usize> {
     let (namespace, last) = depth.rsplit_once('/')?;
-    // What a transport or librealsense's recorder adds to a topic's name.
+    // Suffixes that a transport or librealsense's recorder adds to the topic's name.
     let namespace = match last {
         "compressedDepth" | "data" => namespace.rsplit_once('/')?.0,
         _ => namespace,

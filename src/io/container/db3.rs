@@ -1,4 +1,4 @@
-//! The SQLite storage of ROS 2's rosbag2 (.db3); messages compressed one by one are read too.
+//! The SQLite storage of ROS 2's rosbag2 (.db3), including messages that are compressed one by one.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -20,12 +20,12 @@ pub struct Db3 {
     path: PathBuf,
     database: Mutex<Connection>,
     topics: Vec<Topic>,
-    /// The row of each topic's messages.
+    /// Row ids of each topic's messages.
     rows: Vec<Vec<i64>>,
 }
 
 impl Db3 {
-    /// An error when this is no bag of rosbag2.
+    /// Fails if this is not a rosbag2 file.
     pub fn open(path: &Path) -> Result<Self> {
         let failed = |e| damaged(path, &e);
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
@@ -40,7 +40,7 @@ impl Db3 {
     }
 }
 
-/// Topics and messages lie in tables. A view of these names may be a query without an end.
+/// Whether topics and messages are real tables: a view of that name may be an endless query.
 fn are_tables(database: &Connection) -> rusqlite::Result<bool> {
     let of =
         "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')

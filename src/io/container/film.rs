@@ -17,7 +17,7 @@ use crate::io::assumed::Assumed;
 use crate::io::stills::{Film, Footage};
 use crate::view::{FrameRef, FrameStore, Sensor, Within};
 
-/// Millimetres: what ROS means by 16UC1 (REP 118).
+/// Millimetres: the ROS convention for 16UC1 (REP 118).
 const MILLIMETRES: DepthCode = DepthCode::Metric { units_per_metre: 1000.0, invalid: 0 };
 
 #[derive(Debug)]
@@ -25,9 +25,9 @@ struct BagFilm {
     bag: Box<dyn Bag>,
     topic: usize,
     encoding: Encoding,
-    /// For depths that are floats.
+    /// For float depths.
     units_per_metre: f64,
-    /// The message of each frame.
+    /// Message number of each frame.
     numbers: Vec<usize>,
 }
 
@@ -47,8 +47,8 @@ impl FrameStore for BagFilm {
     }
 }
 
-/// The depth film in a bag, and its sensor.
-/// An error when a message is damaged, or when nothing says what the camera is.
+/// Opens the depth film in a bag and describes its sensor.
+/// Fails if a message is damaged, or if the intrinsics are unknown.
 pub fn open(bag: impl Bag + 'static, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let depth = depth_topic(&bag, assumed.topic.as_deref())?;
     let survey = Survey::of(&bag, depth)?;
@@ -88,10 +88,10 @@ fn decode(
     decoded.map_err(|damage| damaged(bag, topic, number, &damage))
 }
 
-/// What every message of the topic says, and of floats what they hold.
+/// What the headers of a topic's messages say, and for float depths their statistics.
 struct Survey {
     stamps_ns: Vec<i64>,
-    /// Does nobody stamp these images, so that the time of writing has to do?
+    /// Whether no image has a timestamp, so that the time of writing is used.
     unstamped: bool,
     size: (usize, usize),
     scale: Option<Scale>,
@@ -109,7 +109,7 @@ impl Survey {
         if unstamped {
             stamps_ns.clone_from(logged_ns);
         }
-        // A compressed image's size is in its bytes.
+        // The size of a compressed image is in its data.
         let size = match depth.encoding.is_raw {
             true => heads.first().map_or((0, 0), |h| h.1),
             false => decode(bag, depth.topic, 0, depth.encoding)?.0,
@@ -121,7 +121,7 @@ impl Survey {
             Ok(scale)
         };
         let scale = match depth.encoding.is_float {
-            // Sums of whole numbers: the same however the messages are shared out.
+            // Sums of integers: the result does not depend on the split among threads.
             true => {
                 let sums = numbers().try_fold(Scale::new, add);
                 Some(sums.try_reduce(Scale::new, |a, b| Ok(a.merged(b)))?)
@@ -131,7 +131,7 @@ impl Survey {
         Ok(Survey { stamps_ns, unstamped, size, scale })
     }
 
-    /// Stamp, ns, and size of one image whose lengths agree with each other.
+    /// Timestamp, ns, and size of one image, after checking that its lengths are consistent.
     fn head(
         bag: &dyn Bag,
         DepthTopic { topic, encoding }: DepthTopic,
@@ -147,7 +147,7 @@ impl Survey {
         }
     }
 
-    /// Stamps and messages in the order of time.
+    /// Timestamps and message numbers in time order.
     fn in_order(&self, remarks: &mut Vec<String>, topic: &str) -> Vec<(i64, usize)> {
         let mut order: Vec<(i64, usize)> = self.stamps_ns.iter().copied().zip(0..).collect();
         if self.unstamped {
@@ -184,7 +184,7 @@ fn sensor(
         baseline_m: assumed.baseline_m.or(device.baseline_m),
         ..assumed.clone()
     };
-    // What the user gives holds, also where the bag cannot be understood.
+    // What the user gives takes precedence, even if the bag's calibration is unreadable.
     let camera = match assumed.intrinsics {
         Some(_) => None,
         None => camera(bag, depth.topic, survey.size)?,
@@ -239,7 +239,7 @@ fn code(
     Ok(code)
 }
 
-/// Stamps, s, and degrees Celsius of the only topic of temperatures.
+/// Timestamps, s, and degrees Celsius from the temperature topic, if there is exactly one.
 fn temperatures(bag: &dyn Bag, remarks: &mut Vec<String>) -> Result<Vec<(f64, f64)>> {
     let is_one = |t: &&Topic| t.kind == "sensor_msgs/Temperature" && !t.logged_ns.is_empty();
     let found: Vec<&Topic> = bag.topics().iter().filter(is_one).collect();

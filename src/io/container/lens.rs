@@ -1,26 +1,27 @@
-//! The lens of a CameraInfo as k1, k2, p1, p2, k3, which is what kinoise knows.
+//! Converts the lens of a CameraInfo to k1, k2, p1, p2, k3, the only model that kinoise supports.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::messages::CameraInfo;
 
-/// The coefficients, `None` for no lens, and what is to be said of them.
+/// The coefficients, `None` for no distortion, and a remark on them.
 pub type Lens = (Option<[f64; 5]>, Option<String>);
 
-/// ROS's and librealsense's names of Brown and Conrady's lens.
+/// Names of the Brown-Conrady model in ROS and librealsense.
 const BROWN: [&str; 2] = ["plumb_bob", "Brown Conrady"];
-/// OpenCV's lens of eight coefficients, which the drivers of time-of-flight cameras publish.
+/// OpenCV's model with eight coefficients, which the drivers of time-of-flight cameras publish.
 const RATIONAL: &str = "rational_polynomial";
-/// px: a depth stays in the pixel that it is of. An Azure Kinect's narrow field is met to 0.01 px at
-/// the middle of its sides and 0.3 px in the corners, which it does not light.
+/// Largest fit error, px: a depth stays in its own pixel. For an Azure Kinect's narrow field
+/// of view the error is 0.01 px at the middle of the sides and 0.3 px in the corners, which
+/// the camera does not illuminate.
 const MAX_ERROR_PX: f64 = 0.5;
-/// Radii at which the two lenses are compared.
+/// Radii at which the two models are compared.
 const RADII: usize = 500;
-/// Tangent of the widest angle that is looked for, and steps to a unit of it.
+/// Tangent of the widest angle searched, and search steps per unit of it.
 const MAX_RADIUS: f64 = 3.0;
 const STEPS: f64 = 1000.0;
 
-/// An error when the lens is another and cannot be said in these coefficients.
+/// Fails if the model is another one and cannot be expressed in these coefficients.
 pub fn lens(info: &CameraInfo) -> Result<Lens, String> {
     let k = &info.distortion;
     let (first, rest) = k.split_at(k.len().min(5));
@@ -45,10 +46,10 @@ pub fn lens(info: &CameraInfo) -> Result<Lens, String> {
     Err(format!("its lens, \"{}\" {k:?}, cannot be said in k1, k2, p1, p2, k3", info.model))
 }
 
-/// k1, k2, k3 that bend rays as the six radial coefficients do out to the image's farthest corner, by
-/// least squares over its area; and how far they are off at most, px.
+/// Least-squares fit of k1, k2, k3 to the six radial coefficients, weighted by area out to the farthest image
+/// corner; and its largest error, px.
 fn nearest(info: &CameraInfo, [k1, k2, k3, k4, k5, k6]: [f64; 6]) -> Option<([f64; 3], f64)> {
-    // How much farther out a ray at radius r comes to lie.
+    // Radial displacement of a ray at radius r.
     let bend = |r: f64| {
         let s = r * r;
         let [over, under] = [[k1, k2, k3], [k4, k5, k6]].map(|[a, b, c]| ((c * s + b) * s + a) * s);
@@ -63,7 +64,7 @@ fn nearest(info: &CameraInfo, [k1, k2, k3, k4, k5, k6]: [f64; 6]) -> Option<([f6
     let powers = |r: f64| Vector3::new(r.powi(3), r.powi(5), r.powi(7));
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for r in radii() {
-        // Rings have areas as their radii.
+        // The area of a ring is proportional to its radius.
         normal += r * powers(r) * powers(r).transpose();
         right += r * bend(r) * powers(r);
     }
@@ -85,7 +86,7 @@ mod tests {
 
     #[test]
     fn a_rational_lens_becomes_the_nearest_of_five_coefficients() {
-        // As an Azure Kinect's narrow field.
+        // Similar to an Azure Kinect's narrow field of view.
         let d = [4.0437, 2.5939, 1e-5, -2e-5, 0.1287, 4.3788, 3.9073, 0.6963];
         let (k, said) = lens(&info(RATIONAL, &d)).unwrap();
         let [k1, k2, p1, p2, k3] = k.unwrap();
@@ -107,7 +108,7 @@ mod tests {
             (Some([0.1, -0.2, 0.0, 0.0, 0.05]), None)
         );
         assert!(lens(&info("equidistant", &[0.1, 0.0, 0.0, 0.0])).is_err());
-        // As an Azure Kinect's colour camera, whose numerator and denominator nearly have poles.
+        // Similar to an Azure Kinect's colour camera, whose numerator and denominator nearly have poles.
         let colour = info(RATIONAL, &[0.4, -2.5, 0.0, 0.0, 1.46, 0.28, -2.3, 1.39]);
         let intrinsics = [612.0, 612.0, 639.5, 359.5];
         // 6 px off, by numpy.linalg.lstsq.

@@ -1,8 +1,8 @@
 //! MCAP (mcap.dev/spec), with messages of either generation of ROS.
 //!
-//! One walk over the outermost records finds everything, with or without a summary: chunks are stepped
-//! over where a message index stands behind them, and looked into where none does. The crate `mcap` is not
-//! used: its readers hand messages out in order alone, and make room for as much text as a record claims.
+//! One pass over the top-level records finds everything, with or without a summary: chunks are skipped if a
+//! message index follows them, and searched otherwise. The crate `mcap` is not used: its readers only return
+//! messages in order, and allocate as much as a record claims.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -13,7 +13,7 @@ use super::wire::{Damage, Dialect, Wire};
 use crate::error::{Error, Result};
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// The kinds of records that are read.
+/// Opcodes of the records that are read.
 mod op {
     pub const FOOTER: u8 = 2;
     pub const SCHEMA: u8 = 3;
@@ -22,11 +22,11 @@ mod op {
     pub const CHUNK: u8 = 6;
     pub const MESSAGE_INDEX: u8 = 7;
 }
-/// Kind and length of a record.
+/// Length of a record's header: opcode and length.
 const HEAD: u64 = 9;
-/// Of a message before its data: channel, number, two times.
+/// Length of a message record before its data: channel, number, two times.
 const MESSAGE_HEAD: u64 = 22;
-/// Of a chunk before its records, with the longest name of a compression.
+/// Upper limit for a chunk's header, with the longest compression name.
 const CHUNK_HEAD: u64 = 64;
 const REMEDY_CUT: &str =
     "the recording was interrupted or the file is cut: copy it again, or mend it with mcap recover";
@@ -36,20 +36,20 @@ const REMEDY: &str = "the file is damaged; copy or record it again, or mend it w
 pub struct Mcap {
     chunks: Chunks,
     topics: Vec<Topic>,
-    /// Of each topic's messages.
+    /// Positions of each topic's messages.
     places: Vec<Vec<Place>>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Place {
-    /// `None` where it stands in the file itself.
+    /// `None` for a message outside all chunks.
     chunk: Option<u32>,
     at: u64,
     channel: u16,
 }
 
 impl Mcap {
-    /// An error when the file does not end as a whole one does.
+    /// Fails if the file is truncated.
     pub fn open(path: &Path) -> Result<Self> {
         let source = Source::open(path)?;
         let magic = MAGIC.len() as u64;
@@ -102,7 +102,7 @@ fn word64(bytes: &[u8]) -> u64 {
     bytes.first_chunk().map_or(0, |b| u64::from_le_bytes(*b))
 }
 
-/// The channel of a message index, and its messages' times and places.
+/// Channel of a message index, and the times and offsets of its messages.
 fn index(body: &[u8]) -> Result<(u16, Vec<(u64, u64)>), Damage> {
     let mut wire = Wire::new(body, Dialect::Ros1)?;
     let (channel, length) = (wire.u16()?, wire.u32()? as usize);
@@ -110,12 +110,12 @@ fn index(body: &[u8]) -> Result<(u16, Vec<(u64, u64)>), Damage> {
     Ok((channel, entries.iter().map(|e| (word64(e), word64(&e[8..]))).collect()))
 }
 
-/// What was found so far.
+/// State of the pass over the file.
 struct Walk {
     chunks: Chunks,
     schemas: HashMap<u16, String>,
     channels: HashMap<u16, Topic>,
-    /// A message's channel, time and place.
+    /// Channel, time and position of each message.
     messages: Vec<(u16, u64, Place)>,
     /// Chunks without a message index.
     bare: Vec<u32>,
@@ -123,7 +123,7 @@ struct Walk {
 }
 
 impl Walk {
-    /// The outermost records from `at` to the footer.
+    /// Reads the top-level records from `at` to the footer.
     fn file(&mut self, mut at: u64) -> Result<()> {
         let mut indexed = true;
         let mut newest = None;
@@ -210,7 +210,7 @@ impl Walk {
         self.chunks.source.damaged(format!("the record at byte {body}: {why}"), REMEDY)
     }
 
-    /// A message's place, a schema or a channel, in a chunk or outside of one.
+    /// Records a message's position, a schema or a channel, inside a chunk or outside.
     fn record(&mut self, chunk: Option<u32>, at: u64) -> Result<()> {
         let bytes = |at, n| self.chunks.bytes_at(chunk, at, n, "a record");
         let head = bytes(at, HEAD)?;
@@ -252,7 +252,7 @@ impl Walk {
         Ok(())
     }
 
-    /// Look into the chunks that nothing outside describes.
+    /// Searches the chunks without a message index, or all of them if a channel is unknown.
     fn unindexed(&mut self) -> Result<()> {
         let bare: HashSet<u32> = self.bare.iter().copied().collect();
         let known = self.messages.iter().all(|(channel, ..)| self.channels.contains_key(channel));
@@ -270,7 +270,7 @@ impl Walk {
         Ok(())
     }
 
-    /// By topic: several channels may be of one.
+    /// Sorts messages by topic; several channels may share one.
     fn sorted(mut self) -> Result<Mcap> {
         let mut ids: Vec<u16> = self.channels.keys().copied().collect();
         ids.sort_unstable();

@@ -1,25 +1,25 @@
-//! The messages that are read: images, cameras, temperatures, single values.
+//! The message types that are read: images, cameras, temperatures, single values.
 
 pub use super::wire::{Damage, Dialect, Wire};
 
-/// sensor_msgs/Image without its pixels, or sensor_msgs/CompressedImage without its bytes.
+/// sensor_msgs/Image without its pixels, or sensor_msgs/CompressedImage without its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageHead {
-    /// 0 where nobody stamped it.
+    /// 0 if the message has no timestamp.
     pub stamp_ns: i64,
     pub frame_id: String,
     pub size: (usize, usize),
-    /// "16UC1"; of a compressed image its format.
+    /// "16UC1"; for a compressed image, its format.
     pub encoding: String,
     pub big_endian: bool,
-    /// Bytes from row to row.
+    /// Row stride in bytes.
     pub step: usize,
-    /// Where the bytes begin in the message, and how many are announced.
+    /// Offset of the data in the message, and its announced length in bytes.
     pub data_at: usize,
     pub data: usize,
 }
 
-/// Enough of a message for its head, when names are no longer than names are.
+/// Enough bytes of a message for its header, given names of sensible length.
 pub const HEAD_BYTES: u64 = 4096;
 
 fn header(wire: &mut Wire) -> Result<(i64, String), Damage> {
@@ -31,7 +31,7 @@ fn header(wire: &mut Wire) -> Result<(i64, String), Damage> {
 }
 
 impl ImageHead {
-    /// Of a raw image, or of a compressed one, whose size its bytes know.
+    /// Reads the header of a raw image, or of a compressed one, whose size is in its data.
     pub fn read(bytes: &[u8], dialect: Dialect, is_raw: bool) -> Result<Self, Damage> {
         let mut wire = Wire::new(bytes, dialect)?;
         let (stamp_ns, frame_id) = header(&mut wire)?;
@@ -70,7 +70,7 @@ impl CameraInfo {
     }
 }
 
-/// sensor_msgs/Temperature: stamp, ns, and degrees Celsius.
+/// sensor_msgs/Temperature: timestamp, ns, and degrees Celsius.
 pub fn temperature(bytes: &[u8], dialect: Dialect) -> Result<(i64, f64), Damage> {
     let mut wire = Wire::new(bytes, dialect)?;
     let (stamp_ns, _) = header(&mut wire)?;
@@ -88,7 +88,7 @@ pub fn key_value(bytes: &[u8], dialect: Dialect) -> Result<(String, String), Dam
     Ok((wire.text()?, wire.text()?))
 }
 
-/// The decimal seconds that a text file of the same stamp would hold, as the nearest number.
+/// Timestamp in seconds: the double nearest to the decimals that a text file of it would hold.
 pub fn seconds(ns: i64) -> f64 {
     let (whole, part) = (ns.div_euclid(1_000_000_000), ns.rem_euclid(1_000_000_000));
     format!("{whole}.{part:09}").parse().unwrap_or(ns as f64 * 1e-9)

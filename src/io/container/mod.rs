@@ -1,28 +1,28 @@
 //! Files that hold a film: ROS bags (.bag, .mcap, .db3) and NumPy stacks (.npy, .npz).
 //!
-//! A film in a file goes the way of a folder of images. [`open`] gives [`Footage`] and a [`Sensor`], as
-//! the readers of `folder.rs` do, and everything behind it (cutting into still views, measuring, mapping,
-//! correcting) takes its frames one at a time. What differs is where the pixels are: a
+//! A film in a file is processed like a folder of images. [`open`] returns [`Footage`] and a [`Sensor`], as
+//! the readers of `folder.rs` do, and everything after it (cutting into still views, measuring, mapping,
+//! correcting) takes its frames one at a time. Only the location of the pixels differs: a
 //! [`FrameRef`](crate::view::FrameRef) names the file and, in `within`, a
 //! [`FrameStore`](crate::view::FrameStore) and a number.
 //!
 //! ```text
 //! ros1.rs  mcap.rs  db3.rs          the formats: where each message starts, and its bytes    (bag.rs: Bag)
 //!     \      |      /
-//!      blocks.rs                    lengths checked against the file; chunks decompressed, a few kept
-//! messages.rs on wire.rs            a message's fields, in ROS 1's and in CDR's writing
+//!      blocks.rs                    lengths checked against the file; chunks decompressed, a few cached
+//! messages.rs on wire.rs            a message's fields, in ROS 1 and CDR serialisation
 //! pixels.rs                         an image's depths: 16UC1, 32FC1, compressedDepth
-//! topics.rs camera.rs (lens.rs)      which topic holds the depth, and what is said of its camera;
-//! realsense.rs                      in librealsense's own recordings, of its device
+//! topics.rs camera.rs (lens.rs)      which topic holds the depth, and its camera;
+//! realsense.rs                      in librealsense's own recordings, its device
 //! film.rs                           a topic as a FrameStore
 //! stack.rs on npy.rs, npz.rs        arrays in place of messages
-//! scale.rs                          16-bit words for depths that are floats
+//! scale.rs                          16-bit words for float depths
 //! ```
 //!
-//! Memory holds an index (a place and a time for each message of the kinds that are read), a few
-//! decompressed chunks and the frames in use, whatever the length of the file. No length that a file
-//! claims is believed before the file has been seen to be that long. A file that is cut or has no index is
-//! refused with the tool that mends it: a part of a film is not what was recorded.
+//! Memory holds an index (a position and a time for each message of the types that are read), a few
+//! decompressed chunks and the frames in use, whatever the length of the file. Lengths that a file claims are
+//! checked against its size before they are used. A file that is truncated or has no index is refused, with
+//! the name of the tool that repairs it: part of a film is not what was recorded.
 
 mod bag;
 mod blocks;
@@ -53,7 +53,7 @@ use super::stills::Footage;
 use crate::error::{Error, Result};
 use crate::view::Sensor;
 
-/// By the first bytes: names lie.
+/// Detected from the first bytes: names can be wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Ros1,
@@ -63,8 +63,8 @@ enum Kind {
     Npz,
 }
 
-/// What a file of each kind begins with, and the name that promises one, so that a damaged file is not
-/// taken for something else.
+/// Magic bytes of each kind, and the file extension that promises it, so that a damaged file
+/// is not taken for something else.
 const KINDS: [(&[u8], &str, Kind); 5] = [
     (b"#ROSBAG V", "bag", Kind::Ros1),
     (b"\x89MCAP0\r\n", "mcap", Kind::Mcap),
@@ -87,14 +87,14 @@ impl Kind {
     }
 }
 
-/// A folder of rosbag2 stands for the file in it.
+/// A rosbag2 folder stands for the file in it.
 const METADATA: &str = "metadata.yaml";
 
 pub(super) fn is_one(path: &Path) -> bool {
     Kind::of(path).is_some() || path.join(METADATA).is_file()
 }
 
-/// The only bag in a folder of rosbag2.
+/// The only bag in a rosbag2 folder.
 fn bag_in(folder: &Path) -> Result<PathBuf> {
     let mut bags = entries(folder)?;
     bags.retain(|path| matches!(Kind::of(path), Some(Kind::Mcap | Kind::Db3)));
@@ -108,8 +108,8 @@ fn bag_in(folder: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The film in a file and the sensor that took it. Of a film of floats every depth is looked at, because
-/// they decide how it is held. An error when the file is damaged or does not say what is needed.
+/// Opens the film in a file and describes the sensor that took it. A film of floats is scanned completely,
+/// because its depths decide how it is stored. Fails if the file is damaged or lacks required information.
 pub(super) fn open(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     match Kind::of(path) {
         None if path.is_dir() => open(&bag_in(path)?, assumed),

@@ -1,16 +1,16 @@
-//! The header of a .npy file (numpy.lib.format), and the numbers behind it.
+//! The header of a .npy file (numpy.lib.format), and the numbers after it.
 //!
-//! It is a Python dictionary of three known keys; the crates that read it bring a parser of Python's
-//! literals with them.
+//! It is a Python dictionary with three known keys; the crates that read it bring a parser
+//! for Python literals with them.
 
 use super::pixels::{Pixels, each};
 
-/// What one array is.
+/// Shape and number type of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
     pub number: Number,
     pub shape: Vec<usize>,
-    /// Bytes before the numbers.
+    /// Length of the header in bytes.
     pub length: u64,
 }
 
@@ -19,18 +19,18 @@ pub struct Header {
 pub struct Number {
     /// NumPy's letter: u, i or f.
     kind: u8,
-    /// Bytes.
+    /// Size in bytes.
     pub size: usize,
     big_endian: bool,
 }
 
-/// Longer than any header of numbers.
+/// Longer than any header of a numeric array.
 pub const MAX_HEADER: u64 = 16 << 10;
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 impl Header {
-    /// From the first bytes of a file or archive member, at most [`MAX_HEADER`].
-    /// What is wrong, otherwise.
+    /// Parses the first bytes of a file or archive member, at most [`MAX_HEADER`].
+    /// The error is what is wrong.
     pub fn read(first: &[u8]) -> Result<Self, String> {
         let cut = || "the header is cut".to_string();
         let rest = first.strip_prefix(MAGIC).ok_or("it does not begin as a .npy file does")?;
@@ -70,7 +70,7 @@ impl Header {
         Ok(Header { number, shape, length: (first.len() - text.len() + length) as u64 })
     }
 
-    /// Of the numbers; nothing when no file can be that long.
+    /// Bytes of all numbers; `None` on overflow.
     pub fn bytes(&self) -> Option<u64> {
         let times = |n: u64, &size: &usize| n.checked_mul(size as u64);
         self.shape.iter().try_fold(self.number.size as u64, times)
@@ -78,7 +78,7 @@ impl Header {
 }
 
 impl Number {
-    /// Of "<u2" and the like.
+    /// Parses "<u2" and the like.
     fn of(descr: &str) -> Option<Self> {
         let [order, kind, size] = *descr.as_bytes() else { return None };
         let known =
@@ -112,8 +112,8 @@ impl Number {
         }
     }
 
-    /// One image: words as they are, floats as metres, of which a value has `per_metre`.
-    /// What is wrong, when integers are no 16-bit words.
+    /// Pixels of one image: words unchanged, floats divided by `per_metre` to give metres.
+    /// The error is what is wrong, if integers are not 16-bit words.
     pub fn pixels(self, bytes: &[u8], per_metre: f64) -> Result<Pixels, String> {
         if (self.kind, self.size, self.big_endian) == (b'u', 2, false) {
             return Ok(Pixels::Words(each([bytes].into_iter(), u16::from_le_bytes)));

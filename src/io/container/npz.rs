@@ -1,4 +1,4 @@
-//! The members of a .npz archive: where each begins, and its bytes from any place on.
+//! The members of a .npz archive: where each begins, and access to its bytes at any offset.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -11,7 +11,7 @@ use zip::{CompressionMethod, ZipArchive};
 use super::blocks::{MAX_PIECE, Source};
 use crate::error::{Error, Result};
 
-/// One array of the archive, header and all.
+/// One array of the archive, including its header.
 #[derive(Debug, Clone)]
 pub struct Member {
     pub name: String,
@@ -22,11 +22,11 @@ pub struct Member {
 }
 
 const REMEDY: &str = "the archive is damaged; write it again with np.savez";
-/// Deflate makes at most 1032 bytes of one.
+/// Deflate expands by at most a factor of 1032.
 const MAX_RATIO: u64 = 1032;
 
-/// The arrays of an archive. An error when it is cut or its members are stored in another way than
-/// NumPy's.
+/// Lists the arrays of an archive. Fails if it is truncated or its members are
+/// not stored as NumPy stores them.
 pub fn members(path: &Path) -> Result<Vec<Member>> {
     let damaged = |why: zip::result::ZipError| Error::recording(path, why.to_string(), REMEDY);
     let file = File::open(path).map_err(|e| Error::read(path, e))?;
@@ -59,7 +59,7 @@ pub fn members(path: &Path) -> Result<Vec<Member>> {
 /// The bytes of one member.
 #[derive(Debug)]
 pub enum Body {
-    /// As they are in the file, from here on.
+    /// Stored as is, from offset `at`.
     Plain {
         source: Source,
         at: u64,
@@ -91,7 +91,7 @@ impl Body {
     }
 }
 
-/// A compressed stream can only be read onwards: some readers stay open where they are.
+/// Reads a compressed stream, which only goes forwards, at any offset: several readers stay open.
 #[derive(Debug)]
 pub struct Inflater {
     source: Arc<Source>,
@@ -100,7 +100,7 @@ pub struct Inflater {
     open: Mutex<Vec<Onwards>>,
 }
 
-/// One more than threads that walk through views.
+/// Readers kept open: one more than the threads that walk through views.
 const OPEN: usize = 9;
 
 #[derive(Debug)]
@@ -138,7 +138,7 @@ impl Inflater {
     }
 }
 
-/// A stretch of a file as a stream.
+/// A range of a file as a stream.
 #[derive(Debug)]
 struct Section {
     source: Arc<Source>,

@@ -1,31 +1,31 @@
-//! The depths in an image message.
+//! Decodes the depths of an image message.
 
 use super::messages::{Damage, ImageHead};
 use crate::camera::usable_size;
 use crate::io::images::png16;
 
-/// Row-major, as many as the size says.
+/// Depths of all pixels, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Pixels {
-    /// In a unit that is said elsewhere; 0 is no measurement.
+    /// In a unit stated elsewhere; 0 is no measurement.
     Words(Vec<u16>),
     /// NaN, infinite or 0 where there is no measurement.
     Metres(Vec<f32>),
 }
 
-/// How the depth of a topic is written: in words or as metres (of a compressed image, quantised inverse
-/// depths), as it is or as a 16-bit PNG behind a header of compressed_depth_image_transport.
+/// How a topic's depth is stored: as words or metres (in compressed images, quantised inverse depths), and
+/// raw or as a 16-bit PNG after a header of compressed_depth_image_transport.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Encoding {
     pub is_raw: bool,
     pub is_float: bool,
 }
 
-/// Bytes before the PNG: an enumeration and two floats.
+/// Length of the header before the PNG: an enumeration and two floats.
 const HEADER: usize = 12;
 
 impl Encoding {
-    /// Of a raw image's encoding, or of a compressed image's format: "16UC1; compressedDepth png".
+    /// Parses a raw image's encoding, or a compressed image's format: "16UC1; compressedDepth png".
     pub fn of(said: &str, is_raw: bool) -> Option<Self> {
         let (encoding, how) = if is_raw { (said, "") } else { said.split_once(';')? };
         if !is_raw && (!how.contains("compressedDepth") || how.contains("rvl")) {
@@ -43,7 +43,7 @@ impl Encoding {
         if self.is_float { 4 } else { 2 }
     }
 
-    /// What is wrong with a head in a message of `length` bytes, before its pixels are read.
+    /// What is wrong with a header in a message of `length` bytes, before its pixels are read.
     pub fn fault(self, head: &ImageHead, length: u64) -> Option<Damage> {
         let (width, height) = head.size;
         if (head.data_at + head.data) as u64 > length {
@@ -65,7 +65,7 @@ impl Encoding {
         })
     }
 
-    /// The size and the depths of a whole message.
+    /// Size and depths of a complete message.
     pub fn decode(
         self,
         head: &ImageHead,

@@ -1,22 +1,23 @@
-//! What librealsense's own recorder says of its device, beside the images
+//! Device information in librealsense's own recordings, stored beside the images
 //! (src/media/ros/ros_file_format.h and ros_writer.cpp of librealsense).
 
 use super::bag::{Bag, Topic};
 use super::messages::{ImageHead, Wire, float32, key_value};
 
-/// Of the sensor that took the images of a topic.
+/// The sensor that took the images of a topic.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Device {
     pub name: Option<String>,
     pub serial: Option<String>,
-    /// Of a depth word, m.
+    /// Depth unit of a word, m.
     pub depth_unit_m: Option<f64>,
     pub baseline_m: Option<f64>,
 }
 
 impl Device {
-    /// Nothing where another program recorded the topic, "/device_0/sensor_0/Depth_0/image/data".
-    /// Messages that cannot be read say nothing: they are not what is measured.
+    /// `None` if another program recorded the topic; librealsense's are
+    /// "/device_0/sensor_0/Depth_0/image/data".
+    /// Unreadable messages are ignored: they are not the measured data.
     pub fn of(bag: &dyn Bag, depth: usize) -> Option<Self> {
         let name = &bag.topics()[depth].name;
         let parts: Vec<&str> = name.split('/').collect();
@@ -31,13 +32,13 @@ impl Device {
             name: info("Name"),
             serial: info("Serial Number"),
             depth_unit_m: unit_of_message(bag, depth).or_else(|| value("depth units")),
-            // In millimetres, whatever the depth's unit.
+            // Given in millimetres, whatever the depth's unit.
             baseline_m: value("stereo baseline").map(|mm| decimal(mm * 1e-3)),
         })
     }
 }
 
-/// A 32-bit float as the decimal number that was meant: 0.001, not 0.0010000000474974513.
+/// Converts a 32-bit float to the decimal that was meant: 0.001, not 0.0010000000474974513.
 fn meant(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }
@@ -50,7 +51,7 @@ fn positive(value: f64) -> Option<f64> {
     (value.is_finite() && value > 0.0).then_some(value)
 }
 
-/// Since its version 2.49 the recorder writes the unit behind an image, and "1" for the frame's name.
+/// Since version 2.49 the recorder appends the unit to an image and writes "1" as the frame's name.
 fn unit_of_message(bag: &dyn Bag, depth: usize) -> Option<f64> {
     let dialect = bag.topics()[depth].dialect;
     let message = bag.message(depth, 0, u64::MAX).ok()?;
@@ -59,7 +60,7 @@ fn unit_of_message(bag: &dyn Bag, depth: usize) -> Option<f64> {
     positive(meant(Wire::new(behind, dialect).ok()?.f32().ok()?))
 }
 
-/// Older names of options have spaces, newer ones underscores.
+/// Older option names have spaces, newer ones underscores.
 fn option_value(bag: &dyn Bag, prefix: &str, option: &str) -> Option<f64> {
     let is_it = |t: &Topic| {
         let name = t.name.strip_prefix(prefix).and_then(|n| n.strip_suffix("/value"));

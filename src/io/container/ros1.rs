@@ -1,7 +1,7 @@
-//! The bag format 2.0 of ROS 1 (wiki.ros.org/Bags/Format/2.0), through its index.
+//! The bag format 2.0 of ROS 1 (wiki.ros.org/Bags/Format/2.0), read through its index.
 //!
-//! The crate `rosbag` maps the file and slices it by the offsets that the file gives: it panics at a bag
-//! that is cut or has no index, which are the damages that happen.
+//! The crate `rosbag` maps the file and slices it at the offsets given in the file: it panics on a bag that
+//! is truncated or has no index, which are the damages that occur in practice.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -18,7 +18,7 @@ const INDEX: u8 = 4;
 const CHUNK: u8 = 5;
 const CHUNK_INFO: u8 = 6;
 const CONNECTION: u8 = 7;
-/// Names and numbers: a header with more is none.
+/// Largest header: names and numbers take less.
 const MAX_HEADER: u64 = 1 << 20;
 const REMEDY_INDEX: &str = "the recording was interrupted or the file is cut: copy it again, or mend it with rosbag reindex";
 const REMEDY: &str = "the file is damaged; copy or record it again";
@@ -27,7 +27,7 @@ const REMEDY: &str = "the file is damaged; copy or record it again";
 pub struct Ros1Bag {
     chunks: Chunks,
     topics: Vec<Topic>,
-    /// Of each topic's messages.
+    /// Positions of each topic's messages.
     places: Vec<Vec<Place>>,
 }
 
@@ -39,7 +39,7 @@ struct Place {
 }
 
 impl Ros1Bag {
-    /// An error when it has no index or the index says what is not there.
+    /// Fails if the bag has no index or the index contradicts the file.
     pub fn open(path: &Path) -> Result<Self> {
         let source = Source::open(path)?;
         let version =
@@ -57,8 +57,8 @@ impl Ros1Bag {
         Ok(bag)
     }
 
-    /// Take the topics from the end of the file. Where each chunk begins, in the order of the file; and
-    /// the topic of each connection: several may write to one.
+    /// Reads the topics from the end of the file. Returns where each chunk begins, in file order, and the
+    /// topic of each connection; several may write to one topic.
     fn index(&mut self) -> Result<(Vec<u64>, HashMap<u32, usize>)> {
         let source = &self.chunks.source;
         let head = Record::at(source, VERSION.len() as u64)?;
@@ -114,7 +114,7 @@ impl Ros1Bag {
             return Err(source.damaged(what, REMEDY_INDEX));
         }
         begins.sort_unstable();
-        // Each would be gone through again, with all that its index lists.
+        // A chunk listed twice would be read twice, with all its messages.
         if begins.windows(2).any(|w| w[0] == w[1]) {
             return Err(source.damaged("the index lists a chunk twice", REMEDY_INDEX));
         }
@@ -141,7 +141,7 @@ impl Ros1Bag {
         let chunk = Chunk { at: record.data_at, stored: record.data, size, compression, crc: None };
         let mut next = record.end();
         let number = self.chunks.push(chunk)? as u32;
-        // The index of a chunk's messages stands behind it, a record a connection.
+        // Index records follow their chunk, one per connection.
         let source = &self.chunks.source;
         while next < source.length {
             let record = Record::at(source, next)?;
@@ -200,13 +200,13 @@ impl Bag for Ros1Bag {
         }
         let length = length(at + 4 + header)?;
         let begin = at + 8 + header;
-        // The whole of it has to be there, whatever is asked for.
+        // The whole message must be there, however much is requested.
         self.chunks.bytes(chunk, begin + length, 0, "the end of a message")?;
         Ok(Message { bytes: bytes(begin, length.min(limit))?, length })
     }
 }
 
-/// A header of named fields, and data.
+/// A header of named fields, followed by data.
 struct Record<'s> {
     fields: Fields<'s>,
     data_at: u64,
@@ -239,10 +239,10 @@ impl<'s> Record<'s> {
     }
 }
 
-/// "name=value", each behind its length.
+/// "name=value" fields, each after its length.
 struct Fields<'s> {
     source: &'s Source,
-    /// Of the record in the file, for errors.
+    /// Position of the record in the file, for errors.
     at: u64,
     bytes: Vec<u8>,
 }

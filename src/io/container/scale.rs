@@ -1,24 +1,24 @@
-//! 16-bit words for depths that come as floats: the unit that loses least.
+//! Chooses the 16-bit unit for float depths that loses least precision.
 
 use crate::frame::{DepthCode, FARTHEST_M};
 
-/// What a film's depths are like.
+/// Statistics of a film's depths.
 #[derive(Debug, Clone)]
 pub struct Scale {
-    /// How many depths lie in each centimetre.
+    /// Number of depths in each centimetre.
     counts: Vec<u64>,
-    /// How many are whole steps of each unit of [`EXACT`].
+    /// Number of depths that are whole multiples of each unit in [`EXACT`].
     whole: [u64; EXACT.len()],
     all: u64,
-    /// Farther than anything that is measured.
+    /// Number of values beyond any measurable depth.
     far: u64,
 }
 
-/// Units a metre in which sensors measure: millimetres; TUM's; a tenth of a millimetre.
+/// Units per metre in which sensors measure: millimetres; TUM's; tenths of a millimetre.
 const EXACT: [f64; 3] = [1000.0, 5000.0, 10_000.0];
-/// Where none is exact, the finest that reaches far enough.
+/// If none is exact, the finest of these that reaches far enough.
 const UNITS: [f64; 6] = [50_000.0, 20_000.0, 10_000.0, 5000.0, 2000.0, 1000.0];
-/// Depths that may lie beyond the end of the words, or off a lattice: strays.
+/// Largest share of depths allowed beyond the range of the words, or off the lattice.
 const MAX_STRAYS: f64 = 1e-4;
 const BINS_PER_METRE: f64 = 100.0;
 
@@ -38,7 +38,7 @@ impl Scale {
             self.counts[(z * BINS_PER_METRE) as usize] += 1;
             for (whole, units) in self.whole.iter_mut().zip(EXACT) {
                 let steps = z * units;
-                // As near as a 32-bit float is to the decimal number.
+                // Within the precision of a 32-bit float.
                 let near = (steps - steps.round()).abs() <= steps * f64::from(f32::EPSILON);
                 *whole += u64::from(near);
             }
@@ -53,13 +53,13 @@ impl Scale {
         self
     }
 
-    /// How many depths lie beyond what words of this unit reach.
+    /// Number of depths beyond the range of words in this unit.
     fn beyond(&self, units: f64) -> u64 {
         let last = (f64::from(u16::MAX) / units * BINS_PER_METRE) as usize;
         self.counts.iter().skip(last).sum()
     }
 
-    /// The code, and what is to be said of it. An error when these are no depths in metres.
+    /// The depth code, and a remark on it. Fails if these are not depths in metres.
     pub fn code(&self) -> Result<(DepthCode, Option<String>), String> {
         let few = |n: u64| n as f64 <= MAX_STRAYS * self.all as f64;
         let reaches = |units: f64| few(self.beyond(units));
@@ -86,7 +86,7 @@ impl Scale {
     }
 }
 
-/// The words of depths; 0 where there is none or the words do not reach.
+/// Depths as words; 0 if there is no depth or it is out of range.
 pub fn words(metres: &[f32], units_per_metre: f64) -> Vec<u16> {
     let word = |&z: &f32| {
         let steps = (f64::from(z) * units_per_metre).round();

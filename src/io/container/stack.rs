@@ -1,8 +1,8 @@
 //! A NumPy array of depth images as a film: frames x rows x columns, or one image.
 //!
-//! A .npy file is as a folder of PNGs is: what the sensor was is told by options, and without stamps every
-//! still stretch counts. A .npz archive may hold more arrays: `K` (3 x 3, or fx, fy, cx, cy), `D` (k1, k2,
-//! p1, p2, k3), `timestamps` (s, one a frame) and `units_per_metre`.
+//! A .npy file is treated as a folder of PNGs: the sensor is described by options and, without timestamps,
+//! every still stretch counts. A .npz archive may hold more arrays: `K` (3 x 3, or fx, fy, cx, cy), `D` (k1,
+//! k2, p1, p2, k3), `timestamps` (s, one per frame) and `units_per_metre`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -23,18 +23,18 @@ use crate::view::{FrameRef, FrameStore, Sensor, Within};
 const REMEDY: &str = "save frames x rows x columns with np.save";
 const REMEDY_CUT: &str = "the file is cut or damaged; save it again with np.save";
 
-/// An array and its bytes.
+/// An array's header and data.
 #[derive(Debug)]
 struct Array {
     path: std::path::PathBuf,
-    /// In an archive.
+    /// Name in an archive.
     name: Option<String>,
     header: Header,
     body: Body,
 }
 
 impl Array {
-    /// An error when the bytes are not as many as the header says.
+    /// Fails if the data are shorter than the header says.
     fn open(path: &Path, member: Option<&Member>) -> Result<Self> {
         let name = member.map(|m| m.name.clone());
         let source = Source::open(path)?;
@@ -68,7 +68,7 @@ impl Array {
         }
     }
 
-    /// All of a small array.
+    /// All values of a small array.
     fn values(&self) -> Result<Vec<f64>> {
         let n = self.header.bytes().unwrap_or(0);
         Ok(self.header.number.values(&self.body.bytes(self.header.length, n, "an array")?))
@@ -121,7 +121,7 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     film(depth, beside, assumed)
 }
 
-/// What an archive says beside its images.
+/// What an archive contains besides its images.
 #[derive(Default)]
 struct Beside {
     intrinsics: Option<[f64; 4]>,
@@ -168,7 +168,7 @@ const REMEDY_K: &str = "correct it, or leave it out and give --intrinsics fx,fy,
 struct Stack {
     array: Array,
     size: (usize, usize),
-    /// Of floats: values in a metre, and words in a metre.
+    /// For floats: stored values per metre, and output words per metre.
     values_per_metre: f64,
     units_per_metre: f64,
 }
@@ -264,7 +264,7 @@ fn film(array: Array, beside: Beside, assumed: &Assumed) -> Result<(Footage, Sen
     Ok((Footage { frames, film, remarks, ..Footage::default() }, sensor))
 }
 
-/// How floats are held: metres, or as many a metre as is said.
+/// Depth code for floats, which are in metres unless `given` says otherwise.
 fn float_code(
     stack: &mut Stack,
     count: usize,

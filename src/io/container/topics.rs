@@ -1,4 +1,4 @@
-//! Which topic of a bag holds the depth.
+//! Finds the topic of a bag that holds the depth.
 
 use super::bag::{Bag, Topic};
 use super::messages::{HEAD_BYTES, ImageHead};
@@ -12,7 +12,7 @@ pub struct DepthTopic {
     pub encoding: Encoding,
 }
 
-/// The one that is named, or the only one there is. An error that lists them when there are several.
+/// The named topic, or the only one. Fails with a list if there are several.
 pub fn depth_topic(bag: &dyn Bag, named: Option<&str>) -> Result<DepthTopic> {
     let topics = bag.topics();
     let error = |what: String, remedy| Err(Error::recording(bag.path(), what, remedy));
@@ -50,13 +50,13 @@ pub fn depth_topic(bag: &dyn Bag, named: Option<&str>) -> Result<DepthTopic> {
 
 const REMEDY_KIND: &str = "record sensor_msgs/Image as 16UC1 or 32FC1, or compressedDepth as PNG";
 
-/// Infrared images of 16 bits have the encodings of depth.
+/// Infrared images of 16 bits use the same encodings as depth.
 fn is_infrared(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     !name.contains("depth") && (name.contains("infra") || name.split('/').any(|p| p == "ir"))
 }
 
-/// How the depth of a topic is written, or why it is none.
+/// Depth encoding of a topic, or why it holds no depth.
 fn encoding(bag: &dyn Bag, topic: usize) -> Result<Result<Encoding, String>> {
     let Topic { dialect, logged_ns, kind, .. } = &bag.topics()[topic];
     let is_raw = match &**kind {
@@ -74,7 +74,7 @@ fn encoding(bag: &dyn Bag, topic: usize) -> Result<Result<Encoding, String>> {
         .ok_or_else(|| format!("holds images as \"{}\", which is no depth", head.encoding)))
 }
 
-/// The error of one message.
+/// Error for one message.
 pub fn damaged(bag: &dyn Bag, topic: usize, number: usize, damage: &str) -> Error {
     let what = format!("{}: {damage}", place(bag, topic, number));
     Error::image(bag.path(), what, "the message is damaged; copy the file again or record it again")

@@ -1,11 +1,11 @@
-//! Fields of a serialised message, one after the other.
+//! Reads the fields of a serialised message in order.
 
-/// How a message is written.
+/// Serialisation format of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dialect {
     /// Little-endian, packed.
     Ros1,
-    /// OMG's common data representation, as ROS 2 writes it: aligned, either byte order.
+    /// OMG's Common Data Representation as ROS 2 writes it: aligned, either byte order.
     Cdr,
 }
 
@@ -20,12 +20,12 @@ pub struct Wire<'a> {
 }
 
 impl<'a> Wire<'a> {
-    /// An error when CDR is announced in a version that ROS does not write.
+    /// Fails if the message has a CDR variant that ROS does not write.
     pub fn new(bytes: &'a [u8], dialect: Dialect) -> Result<Self, Damage> {
         let packed = Wire { bytes, at: 0, dialect, big_endian: false };
         match (dialect, bytes) {
             (Dialect::Ros1, _) => Ok(packed),
-            // Alignment counts from behind this header.
+            // Alignment is relative to the end of this header.
             (Dialect::Cdr, [0, order @ (0 | 1), _, _, body @ ..]) => {
                 Ok(Wire { bytes: body, big_endian: *order == 0, ..packed })
             }
@@ -42,7 +42,7 @@ impl<'a> Wire<'a> {
         Ok(taken)
     }
 
-    /// Of numbers of `n` bytes in CDR.
+    /// Skips the padding before a number of `n` bytes in CDR.
     fn align(&mut self, n: usize) {
         if self.dialect == Dialect::Cdr {
             self.at = self.at.next_multiple_of(n).min(self.bytes.len());
@@ -79,7 +79,7 @@ impl<'a> Wire<'a> {
         self.number().map(f64::from_le_bytes)
     }
 
-    /// A length and as many bytes; in CDR the last is a zero.
+    /// A length-prefixed string; in CDR it ends with a zero byte.
     pub fn text(&mut self) -> Result<String, Damage> {
         let length = self.u32()? as usize;
         let bytes = self.take(length)?;

@@ -50,7 +50,7 @@ fn an_earlier_run_is_replaced_whole_and_not_before_the_end() {
     assert_eq!(held(dir.path()), ["model.json", "part-1", "table.csv"]);
     assert_eq!(fs::read(dir.path().join("table.csv")).unwrap(), b"table.csv");
     again().finish().unwrap();
-    // A model of the earlier run beside the new table would be taken for its own.
+    // A model of the earlier run beside the new table would be taken for the new one.
     assert_eq!(held(dir.path()), ["part-1", "part-2", "table.csv"]);
     assert_eq!(fs::read(dir.path().join("table.csv")).unwrap(), b"new");
 }
@@ -120,7 +120,7 @@ fn nothing_goes_into_an_input() {
     assert_eq!(held(&input), ["recording.json"]);
 }
 
-/// Hours of work are not lost to somebody who makes the folder meanwhile.
+/// Hours of work must not be lost if somebody creates the folder meanwhile.
 #[test]
 fn results_without_a_place_are_kept_and_told() {
     let dir = tempfile::tempdir().unwrap();

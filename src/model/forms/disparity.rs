@@ -29,7 +29,7 @@ impl SigmaForm for Disparity {
     /// sigma^2 is linear in k^2 and s0^2.
     fn start(&self, rows: &Rows) -> Option<Start> {
         let squares = rows.solve_linear(2, |r, out| {
-            // d(sigma) = d(sigma^2) / (2 sigma): both sides are divided so that the weights fit.
+            // d(sigma) = d(sigma^2) / (2 sigma): both sides are divided by sigma so that the weights fit.
             let per = 1.0 / r.sigma_m;
             out[0] = r.z_m.powi(4) * per;
             out[1] = per;

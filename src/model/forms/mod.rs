@@ -1,4 +1,4 @@
-//! Forms of sigma(z, theta), one a file. Adding one: its file, and a line in [`Form`].
+//! Forms of sigma(z, theta), one per file. To add one, add its file and a variant of [`Form`].
 
 mod disparity;
 mod khoshelham;
@@ -18,26 +18,26 @@ pub use paper::PAPER_EQ1;
 /// The largest number of parameters of a form.
 pub const MAX_PARAMETERS: usize = 6;
 
-/// How a parameter is walked while fitting.
+/// Working coordinate of a parameter in the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Walk {
     Linear,
-    /// Positive: its logarithm is walked.
+    /// The logarithm, for a positive parameter.
     Log,
-    /// Greater than the steepest theta of the data, where the form has its pole.
+    /// The logarithm of its excess over the steepest theta of the data, for the pole of a form.
     LogAboveTheta,
 }
 
-/// Where the fit starts: near enough for a local solver, found without a user's guess.
+/// Start of a fit, near enough for a local solver and found without a user's guess.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     pub parameters: Vec<f64>,
-    /// Parameters the data say nothing about, held at a stated value.
+    /// Whether each parameter is held at its value, because the data do not determine it.
     pub held: Vec<bool>,
     pub remarks: Vec<String>,
 }
 
-/// What is said of a form.
+/// Description of a form.
 pub struct Card {
     pub id: &'static str,
     /// As text, with units.
@@ -45,7 +45,7 @@ pub struct Card {
     /// Where it comes from.
     pub reference: &'static str,
     pub parameters: &'static [(&'static str, Walk)],
-    /// Fewest different distances the form needs.
+    /// Fewest different distances that the form needs.
     pub distances_needed: usize,
 }
 
@@ -54,23 +54,23 @@ pub trait SigmaForm: Sync {
     fn card(&self) -> &'static Card;
     /// sigma in m at depth z (m) and tilt theta (rad).
     fn sigma(&self, p: &[f64], z: f64, theta: f64) -> f64;
-    /// Derivatives of sigma by the parameters, into the first slots of `out`.
+    /// Writes the derivatives of sigma by the parameters to the first elements of `out`.
     fn gradient(&self, p: &[f64], z: f64, theta: f64, out: &mut [f64; MAX_PARAMETERS]);
-    /// Where sigma runs to infinity, rad.
+    /// Tilt at which sigma diverges, rad.
     fn pole(&self, _p: &[f64]) -> Option<f64> {
         None
     }
-    /// Where along z sigma is least, m, for a form whose first parameter lifts all of it.
+    /// Depth at which sigma is least, m, for a form whose first parameter is a constant offset.
     fn vertex(&self, _p: &[f64]) -> Option<f64> {
         None
     }
-    /// A start from the data alone. `None` when the data cannot carry the form.
+    /// Finds a start from the data alone. `None` when the data do not support the form.
     fn start(&self, rows: &Rows) -> Option<Start>;
-    /// Where parameter `i` can be believed; beyond, it is held at the edge.
+    /// Plausible range of parameter `i`; beyond, it is held at the edge.
     fn limits(&self, _i: usize, _rows: &Rows) -> Option<[f64; 2]> {
         None
     }
-    /// What to say of parameter `i` when its standard error is of the size of its value.
+    /// Remark on parameter `i` when its standard error is comparable to its value.
     fn why_weak(&self, _i: usize, _rows: &Rows) -> Option<String> {
         None
     }
@@ -122,7 +122,7 @@ impl FromStr for Form {
     }
 }
 
-/// Whitened derivatives of sigma by the free parameters, a row a measurement.
+/// Whitened derivatives of sigma by the free parameters, one row per measurement.
 pub fn natural_jacobian(
     rows: &Rows,
     spec: &dyn SigmaForm,
@@ -148,7 +148,7 @@ pub fn natural_jacobian(
 mod tests {
     use super::*;
 
-    /// Every form's gradient against central differences.
+    /// Compares every form's gradient with central differences.
     #[test]
     fn gradients_match_differences() {
         for form in Form::ALL {

@@ -18,17 +18,17 @@ pub(super) fn vertex_gradient(p: &[f64], z: f64, out: &mut [f64; MAX_PARAMETERS]
     out[2] = -2.0 * p[1] * off;
 }
 
-/// (a, b, c) of alpha + beta z + gamma z^2; `None` when it opens downwards.
+/// Converts alpha + beta z + gamma z^2 to (a, b, c); `None` when it opens downwards.
 pub(super) fn vertex(alpha: f64, beta: f64, gamma: f64) -> Option<[f64; 3]> {
     let c = -beta / (2.0 * gamma);
     (gamma > 0.0).then_some([alpha - gamma * c * c, gamma, c])
 }
 
-/// A vertex farther than this from the data is an extrapolation, not a measurement, m.
+/// Largest plausible |c|, m: a vertex farther away is an extrapolation, not a measurement.
 const VERTEX_REACH_M: f64 = 5.0;
 
-/// Start of a + b (z - c)^2 + d h with h known: all linear. Falls back on holding c where the
-/// parabola has no upward vertex near the data, and d at zero where tilt adds no noise.
+/// Start of a + b (z - c)^2 + d h with h known: a linear fit. Falls back to holding c where the parabola
+/// opens downwards or its vertex is too far away, and d at zero where tilt adds no noise.
 pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Option<Start> {
     let tilted = tilts_differ(rows) && rows.iter().any(|r| h(r) > 0.0);
     let mut remarks = Vec::new();
@@ -66,16 +66,16 @@ pub(super) fn parabola_start(rows: &Rows, h: impl Fn(&SigmaRow) -> f64) -> Optio
     })
 }
 
-/// Do the views differ in tilt at all? If not, the tilt term is one more parabola.
+/// Whether the views differ in tilt at all. If not, the tilt term is one more function of z alone.
 fn tilts_differ(rows: &Rows) -> bool {
     let [min, max] = rows.range(|r| r.theta_rad);
     max - min > ONE_TILT_DEG.to_radians()
 }
 
-/// Views this near in tilt have one: so far is a board off that is set up by hand and eye.
+/// Views within this range have the same tilt: it is the error of a board set up by hand and eye.
 const ONE_TILT_DEG: f64 = 5.0;
 
-/// a and b with c held at the paper's.
+/// a and b with c held at the paper's value.
 fn vertex_held(rows: &Rows, remarks: &mut Vec<String>) -> Option<[f64; 3]> {
     let c = PAPER_EQ1[2];
     let q = rows.solve_linear(2, |r, out| {
@@ -88,8 +88,7 @@ fn vertex_held(rows: &Rows, remarks: &mut Vec<String>) -> Option<[f64; 3]> {
     (q[1] > 0.0).then_some([q[0], q[1], c])
 }
 
-/// The drop of chi-square that three more parameters gain by chance once in a hundred times
-/// (chi-square with 3 degrees of freedom, 1 %: 11.3).
+/// Drop of chi-square that three more parameters gain by chance in 1 % of cases (3 degrees of freedom).
 const TILT_WORTH: f64 = 11.3;
 
 impl SigmaForm for Paper {
@@ -131,7 +130,7 @@ impl SigmaForm for Paper {
         Some(p[5])
     }
 
-    /// Variable projection: for given (e, f) the rest is linear, so only these two are searched.
+    /// By variable projection: for given (e, f) the rest is linear, so only these two are searched.
     fn start(&self, rows: &Rows) -> Option<Start> {
         let steep = rows.steepest() >= TILT_MAY_SHOW_DEG.to_radians();
         let best = if steep { TiltSearch::new(rows).map(|s| s.best()) } else { None };
@@ -174,7 +173,7 @@ fn with_tilt(rows: &Rows, best: &BestTilt) -> Option<Start> {
     Some(start)
 }
 
-/// e and f as printed in the paper; d as far as the data know it.
+/// e and f as printed in the paper, and d where the data determine it.
 fn without_tilt(rows: &Rows) -> Option<Start> {
     let (e, f) = (PAPER_EQ1[4], PAPER_EQ1[5].max(rows.steepest() + 0.02));
     let mut start = parabola_start(rows, |r| r.z_m.powf(e) * tilt(r.theta_rad, f))?;
@@ -184,10 +183,11 @@ fn without_tilt(rows: &Rows) -> Option<Start> {
     Some(start)
 }
 
-/// Without a view this steep whatever else grows with tilt would be dressed up as a pole.
+/// Without a view this steep, anything else that grows with tilt would be fitted as a pole.
 const TILT_MAY_SHOW_DEG: f64 = 70.0;
 
-/// Below this the tilt term of Eq. 1 is under a tenth of the axial one (between 0.5 and 4 m that is at 71.9 to 73.5 degrees).
+/// Below this tilt the tilt term of Eq. 1 is under a tenth of the axial one (the exact tilt is 71.9 to 73.5
+/// degrees, between 0.5 and 4 m).
 const TILT_SHOWS_DEG: f64 = 74.0;
 
 fn why_no_tilt(rows: &Rows) -> String {

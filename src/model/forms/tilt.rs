@@ -1,4 +1,4 @@
-//! The tilt term of the paper's form, and where its fit starts: (e, f) by variable projection.
+//! The tilt term of the paper's form, and the start of its fit: (e, f) by variable projection.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,18 +13,18 @@ pub fn tilt(theta: f64, f: f64) -> f64 {
     ratio * ratio
 }
 
-/// Variable projection for the paper's tilt term: how much a column z^e theta^2/(f - theta)^2
-/// improves on a parabola in z, as a function of (e, f) alone.
+/// Variable projection for the paper's tilt term: the improvement of a column z^e theta^2/(f - theta)^2 over
+/// a parabola in z, as a function of (e, f) alone.
 pub struct TiltSearch<'a> {
     rows: &'a Rows,
     log_z: Vec<f64>,
     /// Orthonormal basis of the whitened 1, z, z^2.
     basis: DMatrix<f64>,
-    /// What the parabola leaves of the whitened sigmas.
+    /// Residual of the whitened sigmas after the parabola.
     left: DVector<f64>,
 }
 
-/// Where the search ended.
+/// Result of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BestTilt {
     pub e: f64,
@@ -32,12 +32,12 @@ pub struct BestTilt {
     /// Drop of the weighted chi-square against no tilt term.
     pub gain: f64,
     pub chi2: f64,
-    /// e, f stand at the edge of the search: the data do not bound them.
+    /// Whether e and f are at the edge of the search, so that the data do not bound them.
     pub at_edge: [bool; 2],
 }
 
-/// The searched box: exponents from Nguyen's -0.5 to Eq. 1's 2.01 and well beyond, the pole from
-/// 0.3 degrees to 3 rad past the steepest view.
+/// The searched box: exponents well beyond Nguyen's -0.5 and Eq. 1's 2.01, and the pole from 0.3 degrees to
+/// 3 rad past the steepest view.
 pub const EXPONENTS: [f64; 2] = [-4.0, 6.0];
 pub const LOG_POLE: [f64; 2] = [-5.3, 1.1];
 const GRID: [usize; 2] = [9, 11];
@@ -72,7 +72,7 @@ impl<'a> TiltSearch<'a> {
         self.rows.iter().map(|r| tilt(r.theta_rad, f)).collect()
     }
 
-    /// Drop of chi-square when the product of the two columns joins the parabola; zero where its
+    /// Drop of chi-square when the product of the two columns is added to the parabola; zero where its
     /// coefficient would be negative.
     fn gain(&self, powers: &[f64], tilts: &[f64]) -> f64 {
         let mut h: Vec<f64> = powers.iter().zip(tilts).map(|(p, t)| p * t).collect();
@@ -125,5 +125,5 @@ impl<'a> TiltSearch<'a> {
     }
 }
 
-/// The local solver takes over from here, so a few digits are enough.
+/// The local solver refines the result, so a few digits are enough.
 const NELDER_MEAD_STEPS: u64 = 40;

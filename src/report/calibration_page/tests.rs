@@ -19,7 +19,7 @@ fn calibration() -> Calibration {
     model_of_table(&read_table(&path).unwrap(), &path, &options).unwrap()
 }
 
-/// A small wall, measured, with numbers to be found on the page.
+/// A small measured wall, with recognisable numbers for the page.
 fn view() -> ViewMeasurement {
     let folder = tempfile::tempdir().unwrap();
     let poses = Grid { distances_m: vec![2.0], tilts_rad: vec![0.0] }.views();

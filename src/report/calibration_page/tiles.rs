@@ -1,4 +1,4 @@
-//! The sensor in a few numbers.
+//! Key numbers of the sensor.
 
 use maud::Markup;
 

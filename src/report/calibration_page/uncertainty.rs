@@ -1,4 +1,4 @@
-//! The uncertainty budgets, as a calibration certificate sets them out.
+//! The uncertainty budgets, laid out as in a calibration certificate.
 
 use maud::{Markup, html};
 
@@ -48,7 +48,7 @@ fn of_views<'a>(
     uncertainty.views.iter().filter_map(|v| Some((v.view.as_str(), budget(v)?))).collect()
 }
 
-/// A row a view, a column a source: the contributions in mm.
+/// A table of contributions in mm, with a row per view and a column per source.
 fn summary(budgets: &[(&str, &Budget)]) -> Markup {
     let mut sources: Vec<&Component> = Vec::new();
     for component in budgets.iter().flat_map(|(_, b)| &b.components) {
@@ -77,7 +77,7 @@ fn summary(budgets: &[(&str, &Budget)]) -> Markup {
     table(&columns, budgets.iter().map(row))
 }
 
-/// The budget with the largest U, row by row.
+/// The largest budget by U, with a row per source.
 fn worst(budgets: &[(&str, &Budget)]) -> Markup {
     let largest = budgets.iter().max_by(|a, b| a.1.expanded_m.total_cmp(&b.1.expanded_m));
     let columns: [Column<'_, Component>; 7] = [
@@ -102,12 +102,12 @@ fn kind(component: &Component) -> &'static str {
     }
 }
 
-/// In mm, to a micrometre where it is below a tenth.
+/// A length in mm, to a micrometre below a tenth of a millimetre.
 fn fine(metres: f64) -> String {
     if metres.abs() < 1e-4 { fixed(MM * metres, 3) } else { millimetres(metres) }
 }
 
-/// Beyond a thousand Student's t is a Gaussian to a thousandth.
+/// Degrees of freedom; above a thousand Student's t equals a Gaussian to a thousandth.
 fn freedom(degrees_of_freedom: Option<f64>) -> String {
     match degrees_of_freedom {
         None => "∞".into(),

@@ -1,4 +1,4 @@
-//! Every view: its numbers in a table, and its residual, which shows what a number cannot.
+//! The views: their numbers in a table, and residual images, which show what numbers cannot.
 
 use maud::{Markup, html};
 
@@ -52,7 +52,7 @@ pub(super) fn section_of(views: &[ViewMeasurement]) -> Markup {
     section("Views", &content)
 }
 
-/// Signed, in mm, and marked where it is too much.
+/// The difference in mm with its sign, marked where it exceeds the tolerance.
 fn off_reference(r: ReferenceDistance) -> String {
     let sign = if r.off_m() > 0.0 { "+" } else { "" };
     let mark = if r.contradicts() { " (!)" } else { "" };

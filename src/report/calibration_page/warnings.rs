@@ -1,4 +1,4 @@
-//! What to know before trusting the model; the same remark about many views is one entry.
+//! The warnings; the same remark about many views is one entry.
 
 use maud::{Markup, html};
 
@@ -6,7 +6,7 @@ use crate::report::document::{self, fold, list, prose};
 use crate::units::counted;
 use crate::view::Excluded;
 
-/// Longer lists fold away.
+/// Longest list that is not folded.
 const MAX_OPEN: usize = 3;
 const ABOUT_A_VIEW: &str = "view ";
 
@@ -37,7 +37,7 @@ pub(super) fn section(warnings: &[String], excluded: &[Excluded]) -> Markup {
     document::section("Warnings", &content)
 }
 
-/// Remarks that differ in the view and in numbers only, together; in order of appearance.
+/// Groups remarks that differ only in the view and in numbers, in order of appearance.
 fn grouped<'a>(warnings: &[&'a str]) -> Vec<Vec<&'a str>> {
     let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
     for &warning in warnings {

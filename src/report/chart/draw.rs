@@ -1,4 +1,4 @@
-//! SVG and PNG from the same shapes.
+//! Draws SVG and PNG from the same shapes.
 
 use std::io::Cursor;
 use std::sync::OnceLock;
@@ -15,17 +15,17 @@ use super::Chart;
 use super::shapes::{FONT, Point, Shape};
 use crate::error::{Error, Result};
 
-/// Pixels of the PNG a unit, after shrinking ...
+/// PNG pixels per unit after downscaling ...
 const PNG_SCALE: u32 = 2;
-/// ... by this factor, which smooths edges that plotters' bitmap leaves jagged.
+/// ... by this factor, which smooths the jagged edges of plotters' bitmaps.
 const OVERSAMPLING: u32 = 2;
-/// plotters' bitmap centres the box of a line, not the letters, units.
+/// Downward shift of PNG text, units: plotters' bitmap backend centres the line box, not the letters.
 const PNG_TEXT_DROP: f64 = 2.0;
-/// Radius of the place that answers a pointer, units: a finger hits it, a neighbour stays apart.
+/// Radius of a tip's hover area, units: large enough for a finger, small enough to separate neighbours.
 const TIP: i32 = 8;
 
 impl Chart {
-    /// As SVG text, with its tips.
+    /// The chart as SVG text, with its tips.
     pub fn svg(&self) -> Result<String> {
         let mut text = String::new();
         self.draw_on(SVGBackend::with_string(&mut text, self.size), 1, 0.0)?;
@@ -37,7 +37,7 @@ impl Chart {
         Ok(text.replace("</svg>", &(tips.collect::<String>() + "</svg>")))
     }
 
-    /// As the bytes of a PNG.
+    /// The chart as the bytes of a PNG.
     pub fn png(&self) -> Result<Vec<u8>> {
         let scale = PNG_SCALE * OVERSAMPLING;
         let (width, height) = (self.size.0 * scale, self.size.1 * scale);
@@ -51,7 +51,7 @@ impl Chart {
         Ok(bytes)
     }
 
-    /// With `unit` px for one of the SVG.
+    /// Draws with `unit` px for each px of the SVG.
     fn draw_on<B: DrawingBackend>(&self, backend: B, unit: u32, text_drop: f64) -> Result<()> {
         if !font_registered() {
             return Err(failed("the built-in font is damaged"));

@@ -1,4 +1,4 @@
-//! How every chart looks, as shapes: axes, layers, legend. Lengths are px of the SVG.
+//! Lays out a chart as shapes: axes, layers, legend. Lengths are px of the SVG.
 
 use std::f64::consts::PI;
 
@@ -15,40 +15,40 @@ use crate::report::colours::{FAINT, GRID, INK};
 
 pub(super) type Point = [f64; 2];
 
-/// What both backends can draw.
+/// Shapes that both backends can draw.
 pub(super) enum Shape {
     Line(Vec<Point>, Stroke),
     Area(Vec<Point>, RGBAColor),
-    /// By two corners.
+    /// Given by two opposite corners.
     Box([Point; 2], RGBAColor),
     /// With the mark's radius, fill and edge.
     Disc(Point, Mark),
-    /// Its left, middle or right at half its height; of this size.
+    /// Text, the place of its left, middle or right end at half its height, anchor, size and colour.
     Text(String, Point, HPos, i32, RGBColor),
 }
 
-/// plotters measures (and, in PNGs, draws) text with this font; SVGs only name the family.
+/// Font with which plotters measures text, and draws it in PNGs; SVGs only name the family.
 pub(super) const FONT: &str = "sans-serif";
-/// plotters writes SVG fonts at 1/1.24 of their size (its ratio of line to em); sizes here are
-/// such that both backends agree to the eye.
+/// plotters writes SVG fonts at 1/1.24 of their size (its ratio of line height to em). These sizes are
+/// chosen so that both backends look alike.
 const TEXT: i32 = 17;
 const SMALL: i32 = 15;
 const TITLE: i32 = 21;
 const TICK: f64 = 5.0;
 const LEGEND_GAP: f64 = 22.0;
-/// Length of a line's sample.
+/// Length of a line's sample in the legend.
 const SAMPLE: f64 = 34.0;
 const SCALE_WIDTH: f64 = 24.0;
-/// Half the width of an error bar's ends.
+/// Half the width of an error bar's caps.
 const CAP: f64 = 3.0;
-/// Half the length of the stroke that a line of one point becomes.
+/// Half the length of the stroke drawn for a line of one point.
 const HALF_STROKE: f64 = 17.0;
-/// From one line of the hatching to the next.
+/// Spacing of the hatching lines.
 const HATCH: f64 = 12.0;
 const HATCH_INK: RGBColor = RGBColor(205, 205, 205);
 
 impl Chart {
-    /// In the order in which they cover one another.
+    /// The shapes in drawing order, later ones on top.
     pub(super) fn shapes(&self) -> Vec<Shape> {
         let (mut sheet, width) = (self.sheet(), f64::from(self.size.0));
         let ([left, bottom], [right, top]) = (sheet.low, sheet.high);
@@ -75,14 +75,14 @@ impl Chart {
         sheet.shapes
     }
 
-    /// Where the tips stand that are inside the axes.
+    /// Places and texts of the tips that are inside the axes.
     pub(super) fn tip_places(&self) -> Vec<(Point, &str)> {
         let sheet = self.sheet();
         let tips = self.tips.iter();
         tips.filter_map(|(at, text)| Some((sheet.inside(at)?, text.as_str()))).collect()
     }
 
-    /// An empty one.
+    /// An empty sheet.
     fn sheet(&self) -> Sheet<'_> {
         let width = f64::from(self.size.0);
         let top = LABEL_ROOM + if self.title.is_empty() { 0.0 } else { TITLE_ROOM };
@@ -94,7 +94,7 @@ impl Chart {
     }
 }
 
-/// The axes' low ends and their high ends, and what was drawn so far.
+/// The corner of the axes' low ends, that of their high ends, and the shapes so far.
 struct Sheet<'a> {
     chart: &'a Chart,
     low: Point,
@@ -256,7 +256,7 @@ impl Sheet<'_> {
         }
     }
 
-    /// Where it ends below.
+    /// Draws a colour scale and returns its lower edge.
     fn scale(&mut self, scale: &ColourScale, [left, y]: Point, height: f64) -> f64 {
         let (right, top) = (left + SCALE_WIDTH, y + 16.0);
         let bottom = top + height;
@@ -278,19 +278,19 @@ impl Sheet<'_> {
     }
 }
 
-/// Of a text; 0 where the font has nothing of it.
+/// Width of a text; 0 if the font cannot measure it.
 fn width(text: &str, size: i32) -> f64 {
     (FONT, size).into_font().box_size(text).map_or(0.0, |(width, _)| f64::from(width))
 }
 
-/// The size, at most `size`, at which a text fits.
+/// Largest font size, at most `size`, at which a text fits.
 fn fitting(text: &str, size: i32, room: f64) -> i32 {
     let shrunk = f64::from(size) * room / width(text, size).max(1.0);
     size.min((shrunk as i32).max(SMALL / 2))
 }
 
-/// Marks after the disc: number of points, turn in half angles between them, and whether it is a
-/// star. Square, triangle, diamond, triangle upside down, star, star on its side.
+/// Marks after the disc: number of points, rotation in half angles between them, and whether it is a star.
+/// Square, triangle, diamond, inverted triangle, star, rotated star.
 const SHAPES: [(u8, f64, bool); 6] = [
     (4, 1.0, false),
     (3, 0.0, false),
@@ -301,9 +301,9 @@ const SHAPES: [(u8, f64, bool); 6] = [
 ];
 
 fn corners((points, turn, star): (u8, f64, bool), [u, v]: Point, radius: f64) -> Vec<Point> {
-    /// Corners reach farther than a disc of the same area.
+    /// Scales corners beyond the radius of a disc of the same area.
     const REACH: f64 = 1.3;
-    /// Of a star, from its middle to its inner corners over that to its points.
+    /// Ratio of a star's inner to its outer radius.
     const WAIST: f64 = 0.42;
     let half = PI / f64::from(points);
     let corner = |i: u8| {

@@ -1,4 +1,4 @@
-//! A card for each finding: what it is, where, how large, how sure, and what to do next.
+//! A card for each finding: what, where, how large, how certain, and what to do next.
 
 use maud::{Markup, html};
 
@@ -14,16 +14,16 @@ use crate::report::document::{drawing, facts, fold, heading, list, prose, sectio
 use crate::report::numbers::{count, fixed, p_value, percent, significant};
 use crate::terms::Statistic;
 
-/// Smaller probabilities are nil.
+/// Probability below which "none of these" is not shown.
 const MIN_PROBABILITY: f64 = 0.0005;
-/// Below this tilt a target counts as facing the sensor, rad: 3 degrees.
+/// Tilt below which a target counts as facing the sensor, rad: 3 degrees.
 const FACING_RAD: f64 = 0.0524;
 
 pub(super) fn findings(findings: &[&Finding]) -> Result<Markup> {
     let blind = |f: &&&Finding| f.status == Status::NotIdentifiable;
     let unseen = findings.iter().filter(blind).count();
     let cards = findings.iter().enumerate().map(card).collect::<Result<Vec<Markup>>>()?;
-    // The largest come first, so that those without a size are the last.
+    // `by_size` puts the effects that cannot be identified last.
     let (seen, hidden) = cards.split_at(cards.len() - unseen);
     let title = format!("{} that these views cannot show", capital(&count(unseen, "effect")));
     Ok(html! { @if !cards.is_empty() {
@@ -66,7 +66,7 @@ fn card((i, finding): (usize, &&Finding)) -> Result<Markup> {
     })
 }
 
-/// Those that are known.
+/// The known facts of a finding.
 fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
     let place = interval(finding.axis, finding.interval, finding.unit);
     let mut facts = vec![
@@ -98,7 +98,7 @@ fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
             facts.push(("Share".into(), share));
         }
     }
-    // `amplitude_px = 0.3 ± 0.1 px`, and what that is.
+    // `amplitude_px = 0.3 ± 0.1 px` and its description.
     facts.extend(finding.parameters.iter().map(|(name, value)| {
         let description = parameters::description(finding.effect, name);
         let value = html! {
@@ -110,7 +110,7 @@ fn finding_facts(finding: &Finding) -> Vec<(String, Markup)> {
     facts
 }
 
-/// Every effect that it could be, best first.
+/// The effects that it could be, best first.
 fn alternatives(finding: &Finding) -> Markup {
     let weighed: Option<f64> = finding.alternatives.iter().map(|a| a.probability).sum();
     let none = weighed.map_or(0.0, |sum| 1.0 - sum);
@@ -127,7 +127,7 @@ fn alternatives(finding: &Finding) -> Markup {
     } }
 }
 
-/// What to do next; nothing where nothing is asked of anybody.
+/// What to do next; `None` where there is nothing to do.
 fn advice(finding: &Finding) -> Option<Markup> {
     let view = finding.next_view.as_ref();
     let more = match finding.status {
@@ -161,7 +161,7 @@ fn advice(finding: &Finding) -> Option<Markup> {
         .then(|| html! { @if let Some(view) = view { (next_view(view)) } (more) })
 }
 
-/// An instruction to a person holding a target.
+/// An instruction to the person holding the target.
 pub(super) fn next_view(next: &NextView) -> Markup {
     let tilt = fixed(next.theta_rad.to_degrees(), 0);
     let far = far_side(next.azimuth_rad);

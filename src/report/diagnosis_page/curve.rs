@@ -1,4 +1,4 @@
-//! A finding's curve: measured points with error bars, and the extended model's line.
+//! A finding's curve: measured points with error bars, and the line of the extended model.
 
 use crate::diagnose::Curve;
 use crate::report::axis::Axis;
@@ -7,16 +7,16 @@ use crate::report::colours::{ACCENT, FAINT, INK};
 use crate::report::numbers::{decimals_for, fixed};
 use crate::stats::range;
 
-/// With more points than this they shrink.
+/// Number of points above which their marks shrink.
 const MANY: usize = 40;
-/// Share of the range left free above and below.
+/// Share of the range left free at each end.
 const MARGIN: f64 = 0.06;
-/// A bar longer than this many times the curve's height does not set the scale.
+/// Half-length of the longest error bar that still sets the scale, in units of the curve's height.
 const MAX_BAR: f64 = 1.5;
-/// Zero belongs into the picture when it is no farther than this many times the curve's height.
+/// Largest distance of zero from the curve at which it is included, in units of the curve's height.
 const MAX_ZERO: f64 = 0.6;
 
-/// `None` where nothing was measured: no curve without its points.
+/// The chart of a curve; `None` if nothing was measured.
 pub(super) fn chart(curve: &Curve) -> Option<Chart> {
     let line = points(curve, &curve.model);
     let marks = points(curve, &curve.y);
@@ -46,7 +46,7 @@ pub(super) fn chart(curve: &Curve) -> Option<Chart> {
     Some(chart)
 }
 
-/// What is known of `values` over the curve's x, in order of it.
+/// The finite `values` over the curve's x, sorted by x.
 fn points(curve: &Curve, values: &[f64]) -> Vec<[f64; 2]> {
     let pairs = curve.x.iter().zip(values).map(|(x, y)| [*x, *y]);
     let mut known: Vec<_> = pairs.filter(|p| p.iter().all(|v| v.is_finite())).collect();
@@ -54,7 +54,7 @@ fn points(curve: &Curve, values: &[f64]) -> Vec<[f64; 2]> {
     known
 }
 
-/// Points, line, zero where it is near, and what of the error bars does not dwarf them.
+/// Range of y: points, line, zero if it is near, and those error bars that do not dwarf them.
 fn heights([low, high]: [f64; 2], bars: &[[f64; 3]]) -> [f64; 2] {
     let far = MAX_ZERO * (high - low);
     let zero = (low <= far && high >= -far).then_some(0.0);

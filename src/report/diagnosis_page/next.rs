@@ -1,4 +1,4 @@
-//! What to do now: the view to take, and the commands to run.
+//! What to do next: the view to take and the commands to run.
 
 use maud::{Markup, html};
 
@@ -7,7 +7,7 @@ use super::cards::next_view;
 use crate::diagnose::{Diagnosis, Verdict};
 use crate::report::document::{list, section};
 
-/// A command, and what it is good for.
+/// A command and its purpose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     pub why: String,
@@ -25,7 +25,7 @@ pub(super) fn section_of(page: &DiagnosisPage<'_>) -> Markup {
     section("What to do next", &list(view(page.diagnosis).into_iter().chain(more).chain(steps)))
 }
 
-/// The one that the largest finding asks for.
+/// The view that the first major finding with such a request asks for.
 fn view(diagnosis: &Diagnosis) -> Option<Markup> {
     let asks = diagnosis.findings.iter().filter(|f| !f.minor).find_map(|f| f.next_view.as_ref());
     asks.map(next_view)

@@ -1,4 +1,4 @@
-//! Parameters of findings: numbers with errors and units, from the names they have in files.
+//! Formats the parameters of findings with errors and units, taken from their names in files.
 
 use maud::{Markup, html};
 use serde_json::Value;
@@ -6,8 +6,7 @@ use serde_json::Value;
 use crate::effects::{self, Parameter};
 use crate::report::numbers::{decimals_for, fixed, significant, with_error};
 
-/// How a name's ending gives the unit: the ending, what the number is multiplied by, the unit.
-/// Longer endings first.
+/// Units by the ending of a name: ending, factor to that unit, unit. Longer endings come first.
 const UNITS: [(&str, f64, &str); 7] = [
     ("_mps", 1e3, " mm/s"),
     ("_deg", 1.0, "°"),
@@ -17,20 +16,20 @@ const UNITS: [(&str, f64, &str); 7] = [
     ("_m", 1.0, " m"),
     ("_s", 1.0, " s"),
 ];
-/// Lengths below it are in mm, m.
+/// Lengths below this are given in mm, m.
 const MILLIMETRES_BELOW_M: f64 = 0.3;
 
-/// Standard errors that hold 90 % of a Gaussian.
+/// Half-width of a Gaussian's 90 % interval, in standard errors.
 const NINETY_PERCENT: f64 = 1.645;
 
-/// What is known of a number.
+/// How well a number is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Known {
-    /// Nobody says how well.
+    /// Without a standard error.
     Bare(f64),
     /// With its standard error.
     Within(f64, f64),
-    /// Its 90 % interval reaches zero: only how large it may be, at most as the catalogue allows.
+    /// An upper bound, because its 90 % interval reaches zero; at most what the catalogue allows.
     UpTo(f64),
 }
 
@@ -48,8 +47,8 @@ pub(super) fn known(effect: Option<&str>, name: &str, value: &Value) -> Option<K
     })
 }
 
-/// `0.125 ± 0.001 px`, `up to 0.6 px`, or to so many digits where the error is not known; whatever
-/// else stands in the file is shown as it is.
+/// `0.1250 ± 0.0010 px`, `up to 0.59 px`, or the value to `digits` where its error is not known. Anything
+/// else in the file is shown as it is.
 pub(super) fn value(effect: Option<&str>, name: &str, value: &Value, digits: usize) -> Markup {
     let (name, _) = split(name);
     let Some(known) = known(effect, name, value) else {
@@ -68,10 +67,10 @@ pub(super) fn value(effect: Option<&str>, name: &str, value: &Value, digits: usi
     }
 }
 
-/// Two digits say themselves how well a number is known, where its error is this share at most.
+/// Largest relative error for which two digits alone show how well a number is known.
 const CLEAR: f64 = 0.1;
 
-/// The same in a sentence, by the name it has in files; only what was estimated is told.
+/// The parameter by its name in files, for a sentence; `None` if it was not estimated.
 pub(super) fn brief(effect: Option<&str>, name: &str, value: &Value) -> Option<String> {
     value.get("value")?;
     let digits = |x: f64| fixed(x, decimals_for(x.abs()));
@@ -88,17 +87,17 @@ fn parameter(effect: Option<&str>, name: &str) -> Option<&'static Parameter> {
     effect.and_then(effects::find)?.card().parameters.iter().find(|p| p.name == name)
 }
 
-/// What the catalogue says a parameter is.
+/// The catalogue's description of a parameter.
 pub(super) fn description(effect: Option<&str>, name: &str) -> &'static str {
     parameter(effect, name).map_or("", |p| p.summary)
 }
 
-/// The key, and what stands behind a comma: `z50_m, near side`.
+/// Splits `z50_m, near side` into the key and the rest from the comma on.
 fn split(name: &str) -> (&str, &str) {
     name.find(',').map_or((name, ""), |at| name.split_at(at))
 }
 
-/// A parameter's name without its unit: `amplitude_px` is an amplitude.
+/// A parameter's name without its unit: `amplitude_px` becomes `amplitude`.
 pub(super) fn title(name: &str) -> String {
     let (name, rest) = split(name);
     let bare = UNITS.iter().find_map(|(ending, ..)| name.strip_suffix(ending));

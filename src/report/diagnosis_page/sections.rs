@@ -1,4 +1,4 @@
-//! The sections of the page but for the findings', one function each.
+//! The sections of the page except those of the findings, one function each.
 
 use maud::{Markup, html};
 
@@ -14,9 +14,9 @@ use crate::report::document::{
 use crate::report::numbers::{count, degrees, fixed, nats, p_value, significant};
 use crate::terms::Statistic;
 
-/// Rows of the map that are open; the rest folds away.
+/// Rows of the map shown open; the rest is folded.
 const OPEN_ROWS: usize = 12;
-/// Longer lists fold away.
+/// Longest list that is not folded.
 const MAX_OPEN: usize = 6;
 const PX_DECIMALS: usize = 3;
 
@@ -43,7 +43,7 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
     answer(class, mark, &sentence, &more)
 }
 
-/// The numbers that go with the verdict.
+/// Key numbers below the verdict.
 fn tiles(diagnosis: &Diagnosis) -> Markup {
     let held = diagnosis.views.iter().filter(|v| v.held_out).count();
     let held = format!("{held} of them kept out for the final test");
@@ -72,7 +72,7 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
     document::tiles(tiles)
 }
 
-/// The final test.
+/// Result on the held-out views.
 pub(super) fn held_out(diagnosis: &Diagnosis) -> Markup {
     let Some(held) = &diagnosis.heldout else { return html! {} };
     let not_scored = diagnosis.has_no_score();
@@ -106,7 +106,7 @@ pub(super) fn held_out(diagnosis: &Diagnosis) -> Markup {
     section("What was gained", &content)
 }
 
-/// The same tests against the extended model.
+/// Results of the same tests against the extended model.
 pub(super) fn remaining(diagnosis: &Diagnosis) -> Markup {
     let after = &diagnosis.after;
     if diagnosis.findings.is_empty() && after.remaining.is_empty() {
@@ -129,7 +129,8 @@ pub(super) fn remaining(diagnosis: &Diagnosis) -> Markup {
     section("What remains", &content)
 }
 
-/// What the absence of a finding is worth.
+/// What was looked for and the smallest detectable effects, which tell what the absence of a finding is
+/// worth.
 pub(super) fn detectable(diagnosis: &Diagnosis) -> Markup {
     let names: Vec<String> =
         diagnosis.detectable.iter().map(|d| title(d.effect).to_string()).collect();
@@ -174,7 +175,7 @@ pub(super) fn cannot_tell(all: &[CannotTell]) -> Markup {
     html! { @if !all.is_empty() { (section("What these views cannot show", &items)) } }
 }
 
-/// Every located mismatch.
+/// Table of every located mismatch.
 pub(super) fn map(rows: &[MapRow]) -> Markup {
     let columns = [">no.", "what is off", "along", "where", ">size", ">chance"];
     let cells = |(i, r): (usize, &MapRow)| {

@@ -1,29 +1,29 @@
-//! What the page says in words: of the verdict, and of findings by their status.
+//! The page's wording of the verdict and of findings by their status.
 
 use crate::diagnose::{Diagnosis, Finding, Reference, Status, Verdict};
 use crate::effects;
 use crate::report::numbers::{count, decimals_for, fixed, millimetres};
 use crate::terms::{Axis, Statistic};
 
-/// Less likely alternatives do not come into a finding's name.
+/// Least probability at which a third or later alternative enters a finding's name.
 const MIN_PROBABILITY: f64 = 0.05;
-/// As many findings come by name into the first sentence.
+/// Most findings named in the first sentence.
 const MAX_NAMES: usize = 3;
-/// From here on times are in minutes, s.
+/// Times from this on are given in minutes, s.
 const MINUTES_FROM_S: f64 = 180.0;
 const SECONDS_A_MINUTE: f64 = 60.0;
 
-/// The catalogue's name of an effect, which fits into a sentence; a new id names itself.
+/// The catalogue's title of an effect, worded to fit into a sentence; an unknown id stands for itself.
 pub(super) fn title(id: &'static str) -> &'static str {
     effects::find(id).map_or(id, |effect| effect.card().title)
 }
 
-/// What the catalogue says of it.
+/// The catalogue's description of an effect.
 pub(super) fn description(id: &'static str) -> &'static str {
     effects::find(id).map_or(id, |effect| effect.card().summary)
 }
 
-/// What the recording was held against.
+/// What the recording was compared with.
 pub fn subject(diagnosis: &Diagnosis) -> &'static str {
     match diagnosis.reference {
         Reference::Model => "model",
@@ -31,7 +31,7 @@ pub fn subject(diagnosis: &Diagnosis) -> &'static str {
     }
 }
 
-/// The answer in a sentence or two.
+/// The verdict in a sentence or two.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
     let effects = missing(&diagnosis.findings);
     let name = |f: &&Finding| [Some(called(f)), f.which_views()].into_iter().flatten();
@@ -76,15 +76,15 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The findings that are physics which the model lacks; the rest is small, about numbers, or cannot
-/// be seen.
+/// Findings that are physics missing from the model. Excluded are minor findings, contradicted effects, wrong
+/// parameters, and effects that cannot be identified.
 pub(super) fn missing(findings: &[Finding]) -> Vec<&Finding> {
     let lacking = [Status::Named, Status::OneOf, Status::Unexplained];
     let lacks = |f: &&Finding| lacking.contains(&f.status) && !f.minor && f.contradicted.is_none();
     findings.iter().filter(lacks).collect()
 }
 
-/// What a finding is called in the middle of a sentence.
+/// Name of a finding in the middle of a sentence.
 pub fn called(finding: &Finding) -> String {
     let what = match finding.statistic {
         Statistic::Bias => "an unexplained bias",
@@ -110,7 +110,7 @@ fn against(id: &'static str) -> String {
     format!("{}, which the recording contradicts", title(id))
 }
 
-/// What something changes over, after its name.
+/// The axis of a change, worded to follow its name.
 pub(super) fn along(axis: Axis) -> String {
     match axis {
         Axis::Pixel => "from pixel to pixel".into(),
@@ -118,7 +118,7 @@ pub(super) fn along(axis: Axis) -> String {
     }
 }
 
-/// Class and text of a finding's badge.
+/// CSS class and text of a finding's badge.
 pub(super) fn badge(finding: &Finding) -> (&'static str, &'static str) {
     match finding.status {
         _ if finding.contradicted.is_some() => ("bad", "not in the recording"),
@@ -134,7 +134,7 @@ pub(super) fn axis(axis: Axis) -> &'static str {
     axis.in_words()
 }
 
-/// What of a reading is not as the model has it.
+/// The statistic that differs from the model, in words.
 pub(super) fn statistic(statistic: Statistic) -> &'static str {
     match statistic {
         Statistic::Bias => "mean depth",
@@ -145,7 +145,7 @@ pub(super) fn statistic(statistic: Statistic) -> &'static str {
     }
 }
 
-/// A stretch of an axis, in units people use.
+/// An interval of an axis in everyday units.
 pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String {
     if !(low.is_finite() && high.is_finite()) {
         return "over its whole range".into();
@@ -168,7 +168,7 @@ pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String 
     if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
 }
 
-/// Does either half of the views alone support it?
+/// Whether the two halves of the views agree on a finding, in words.
 pub(super) fn halves(replicated: Option<bool>) -> &'static str {
     match replicated {
         Some(true) => "Both show it alike",
@@ -177,12 +177,12 @@ pub(super) fn halves(replicated: Option<bool>) -> &'static str {
     }
 }
 
-/// Of a size that already is in mm.
+/// A size that already is in mm.
 pub(super) fn mm(value: f64) -> String {
     format!("{} mm", millimetres(1e-3 * value))
 }
 
-/// What a p-value means.
+/// A p-value in words.
 pub(super) fn chance(p: Option<f64>) -> String {
     let Some(p) = p else { return "no test gave a p-value".into() };
     let often = match p {
@@ -193,7 +193,7 @@ pub(super) fn chance(p: Option<f64>) -> String {
     format!("chance alone does this {often}")
 }
 
-/// To two digits, with a comma at the thousands.
+/// A number to two digits, with a comma at the thousands.
 fn thousands(value: f64) -> String {
     let unit = 10f64.powf((value.log10().floor() - 1.0).max(0.0));
     let mut digits = format!("{:.0}", (value / unit).round() * unit);
@@ -202,7 +202,7 @@ fn thousands(value: f64) -> String {
     digits
 }
 
-/// `a, b and c`.
+/// Joins items as in `a, b and c`.
 pub(super) fn join(items: &[String], last: &str) -> String {
     match items {
         [] => String::new(),
@@ -216,7 +216,7 @@ pub(super) fn capital(words: &str) -> String {
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }
 
-/// With a capital and a full stop.
+/// Capitalises the words and ends them with a full stop.
 pub(super) fn sentence(words: &str) -> String {
     let words = capital(words.trim());
     if words.is_empty() || words.ends_with(['.', '!', '?']) { words } else { words + "." }

@@ -1,4 +1,4 @@
-//! A diagnosis in a few sentences, for the page's first screen and for the terminal.
+//! A diagnosis in a few sentences, for the page's first screen and the terminal.
 
 use super::parameters::brief;
 use super::sentences::{called, capital, join, mm};
@@ -7,12 +7,12 @@ use crate::diagnose::{Diagnosis, Finding, HeldOut, NextView, Status, Verdict};
 use crate::report::numbers::{count, fixed, nats};
 use crate::terms::{Basis, Statistic};
 
-/// So many findings have a sentence each; with the verdict, the rest, what is gained and what is left
-/// that makes seven.
+/// Most findings with a sentence each. With the verdict, the remaining findings, the gain and what is left
+/// that makes seven sentences.
 const MAX_SENTENCES: usize = 3;
 
-/// The largest findings a sentence each, all others in one, what views kept aside gain, and what the
-/// same tests find against the extended model: six at most, after the verdict's.
+/// Tells the largest findings in a sentence each, all others in one, the gain on the held-out views, and what
+/// the same tests find against the extended model: at most six sentences after the verdict.
 pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
     if diagnosis.verdict != Verdict::Mismatch {
         let unsettled = diagnosis.verdict == Verdict::Inconclusive;
@@ -28,7 +28,7 @@ pub fn story(diagnosis: &Diagnosis) -> Vec<String> {
     sentences
 }
 
-/// A finding: what, how large, how much of all, with which parameters, and what to doubt of it.
+/// One finding: what, size, share of the mismatch, parameters, and doubts.
 fn of(f: &Finding) -> String {
     let smooth = |b: &Basis| matches!(b, Basis::Spline { .. } | Basis::Map { .. });
     let and_rest = f.effect.is_some() && f.terms.iter().any(|t| smooth(&t.basis));
@@ -39,7 +39,7 @@ fn of(f: &Finding) -> String {
         }
         _ => String::new(),
     };
-    // The shape of what some views have tells which.
+    // The shape of a finding in some views already tells in which.
     let which = f.which_views().filter(|_| rest.is_empty());
     let which = which.map_or_else(String::new, |which| format!(", {which}"));
     let size = match f.statistic {
@@ -47,7 +47,7 @@ fn of(f: &Finding) -> String {
             few if few == "0.0" => Some("less than 0.1 % of the pixels lost".to_string()),
             percent => Some(format!("{percent} % of the pixels lost")),
         },
-        // A motion has a speed, and no size of its own.
+        // A motion has a speed but no size.
         _ if f.size.mm == 0.0 && f.size.sigma == 0.0 => None,
         _ => {
             let sigmas = match fixed(f.size.sigma, 2) {
@@ -82,7 +82,7 @@ fn settled_by(view: &NextView) -> String {
     format!("; a view at {} m {pose} {helps}", fixed(view.z_m, 2))
 }
 
-/// Findings without a sentence of their own.
+/// Summarises the findings without a sentence of their own.
 fn rest(more: &[&Finding], minor: &[&Finding]) -> Option<String> {
     let share = |all: &[&Finding]| all.iter().map(|f| f.share).sum::<f64>();
     let names = |all: &[&Finding]| {
@@ -113,14 +113,14 @@ fn small_percent(share: f64) -> String {
     }
 }
 
-/// Of views kept aside, before and after; `None` where noise alone was found, and what is smooth stays as it is.
+/// RMS on the held-out views before and after; `None` if both print alike, as when only noise was found.
 pub(super) fn smooth_residual(h: &HeldOut) -> Option<[String; 2]> {
     let [before, after] = [h.rms_mm_before, h.rms_mm_after].map(mm);
     (before != after).then_some([before, after])
 }
 
 pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
-    // Without a finding there is nothing to gain by.
+    // Without a finding nothing can be gained.
     let h = diagnosis.heldout.as_ref().filter(|_| diagnosis.verdict != Verdict::Match)?;
     let aside = count(h.views.len(), "view");
     if h.is_nothing() {

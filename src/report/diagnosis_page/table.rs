@@ -1,4 +1,4 @@
-//! All findings in one table, the largest first; what is small folds away.
+//! A table of all findings, the largest first; minor ones are folded.
 
 use maud::{Markup, html};
 
@@ -12,7 +12,7 @@ const COLUMNS: [&str; 8] =
     ["finding", ">size", ">times σ", ">name", ">chance", "what is off", "where", "~what to do"];
 
 pub(super) fn findings(main: &[&Finding], minor: &[&Finding]) -> Markup {
-    // What cannot be seen has no size; its own parts come after the others'.
+    // Effects that cannot be identified have no size; their cards come after the others.
     let seen = main.iter().enumerate().filter(|(_, f)| f.status != Status::NotIdentifiable);
     let rows: Vec<Vec<Markup>> = seen.map(|(i, f)| line(i, f)).collect();
     if rows.is_empty() && minor.is_empty() {
@@ -32,7 +32,7 @@ pub(super) fn findings(main: &[&Finding], minor: &[&Finding]) -> Markup {
     section("What was found", &content)
 }
 
-/// Where a finding's own part of the page is.
+/// Heading of a finding's card, to which its row links.
 pub(super) fn title(i: usize, finding: &Finding) -> String {
     format!("{}. {}", i + 1, capital(&called(finding)))
 }
@@ -58,12 +58,12 @@ fn line(i: usize, f: &Finding) -> Vec<Markup> {
     ]
 }
 
-/// Is it an error of what was measured, which no correction takes out?
+/// Whether the finding is an error of the target, which no correction removes.
 fn is_of_target(f: &Finding) -> bool {
     !f.terms.is_empty() && f.terms.iter().all(|t| !t.belongs_to_sensor())
 }
 
-/// In a few words; the finding's own part says it in full.
+/// Advice in a few words; the finding's card gives it in full.
 fn short_advice(f: &Finding) -> String {
     match (f.status, &f.next_view) {
         (Status::OneOf, Some(view)) | (Status::Unexplained, Some(view)) => {
@@ -83,7 +83,7 @@ fn short_advice(f: &Finding) -> String {
     }
 }
 
-/// What is less than a hundredth of the mismatch.
+/// Table of the findings below a hundredth of the mismatch.
 fn small(minor: &[&Finding]) -> Markup {
     let share = fixed(100.0 * minor.iter().map(|f| f.share).sum::<f64>(), 1);
     let columns = [

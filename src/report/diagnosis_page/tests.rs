@@ -120,7 +120,7 @@ fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
     }
 }
 
-/// Diagnoses of every kind, and what the page of each must say.
+/// Diagnoses of every kind, with what the page of each must say.
 fn cases() -> [(Diagnosis, &'static [&'static str]); 9] {
     use Verdict::{Inconclusive, Match, Mismatch};
     let named = bowl(Status::Named, [("radial-disparity-bias", 0.97), ("lens-distortion", 0.02)]);
@@ -246,7 +246,7 @@ fn rendered(diagnosis: &Diagnosis, picture: ViewPictures) -> Result<String> {
     diagnosis_page(&DiagnosisPage { title, diagnosis, pictures: shown, steps, origin })
 }
 
-/// The text of a page without pictures, style and tags; one space between words.
+/// The text of a page without pictures, style and tags, with single spaces.
 fn text(page: &str) -> String {
     let without = |page: &str, from: &str, to: &str| {
         let (first, parts) = page.split_once(from).unwrap_or((page, ""));
@@ -292,7 +292,7 @@ fn odd_numbers_do_not_break_a_page() {
     assert!(rendered(&diagnosis, torn).is_err());
 }
 
-/// With a name and without, once.
+/// The number of views is told once, for findings with and without a name.
 #[test]
 fn what_some_views_have_is_told_of_those() {
     let of = |f: Finding| {
@@ -310,7 +310,7 @@ fn what_some_views_have_is_told_of_those() {
     assert_eq!(told.matches("in 5 of 20 views").count(), 1, "{told}");
 }
 
-/// Verdict and story together; what is small, and what is not told one by one, has a sentence.
+/// Verdict and story together; minor and further findings share a sentence.
 #[test]
 fn a_story_has_seven_sentences_at_most() {
     let part = |share, minor| Finding {
@@ -334,7 +334,7 @@ fn a_story_has_seven_sentences_at_most() {
     }
 }
 
-/// Of a search alone can it be said that it finds nothing without the views kept aside.
+/// Only where there was a search can the page say that it finds nothing without the held-out views.
 #[test]
 fn that_views_kept_aside_gain_nothing_is_told_of_what_was_searched() {
     let said = |terms: Vec<Term>| {

@@ -1,4 +1,4 @@
-//! What the map page's script draws: discs packed into a few bytes each, and paths.
+//! Data drawn by the map page's script: discs packed into a few bytes each, and paths.
 
 use std::collections::HashMap;
 
@@ -10,15 +10,15 @@ use super::super::trajectories::Against;
 use crate::map::{FrameReport, MapPoint};
 use crate::stats::{quantile, range};
 
-/// Colours show sigma between these quantiles, on a logarithmic scale.
+/// Quantiles of sigma between which the colours run, on a logarithmic scale.
 const SHOWN: [f64; 2] = [0.02, 0.98];
-/// Places are stored in 16 bits over the map's extent.
+/// Largest value of a coordinate, stored in 16 bits over the map's extent.
 const STEPS: f64 = 65_535.0;
-/// Bytes of a point: three places in 16 bits, a normal in two bytes, red, green, blue, sigma, and
-/// how far the next one is.
+/// Bytes of a point: three coordinates of 16 bits, a normal in two bytes, red, green, blue, sigma, and the
+/// spacing of the points.
 const BYTES: usize = 13;
 
-/// As JSON; it holds no text of a user's.
+/// The scene as JSON; it contains no user text.
 pub(super) fn data(
     shown: &[&MapPoint],
     frames: &[FrameReport],
@@ -49,7 +49,7 @@ fn place(pose: &Isometry3<f64>) -> [f64; 3] {
     [t.x, t.y, t.z].map(rounded)
 }
 
-/// The true path in the frame of the map, while there is an estimate.
+/// The true path in the frame of the map, over the time of the estimate.
 fn truth(against: Option<&Against<'_>>) -> Vec<f64> {
     let Some(against) = against else { return Vec::new() };
     let stamps = range(against.estimate.iter().map(|p| p.stamp));
@@ -58,7 +58,7 @@ fn truth(against: Option<&Against<'_>>) -> Vec<f64> {
     within.flat_map(|p| place(&(map_from_truth * p.world_from_camera))).collect()
 }
 
-/// Between which the colours run, m.
+/// Range of sigma over which the colours run, m.
 fn sigmas(shown: &[&MapPoint]) -> [f64; 2] {
     let positive = shown.iter().map(|p| f64::from(p.sigma)).filter(|s| *s > 0.0 && s.is_finite());
     let mut all: Vec<f64> = positive.collect();
@@ -66,15 +66,16 @@ fn sigmas(shown: &[&MapPoint]) -> [f64; 2] {
     [low, high.max(1.1 * low)]
 }
 
-/// How far points lie apart where each lies, m, and the ends of what is stored.
+/// Spacing of the points around each point, m, and the range that is stored.
 struct Spacing {
     each: Vec<f64>,
     ends: [f64; 2],
 }
 
 impl Spacing {
-    /// By cells of a hundredth of the map: a surface fills a square of a cell with its points. A cell
-    /// that it only cuts has fewer, so the fullest of it and the six beside it counts.
+    /// Counts points in cells of a hundredth of the map. A surface crossing a cell fills a square of the
+    /// cell's side with points. A cell that it only clips has fewer, so the fullest of the cell and its six
+    /// neighbours counts.
     fn of(shown: &[&MapPoint], extents: [[f64; 2]; 3]) -> Self {
         const CELLS: f64 = 100.0;
         const FINEST: f64 = 1.0 / 64.0;
@@ -99,7 +100,8 @@ impl Spacing {
     }
 }
 
-/// Any first part of them is spread over all of the map: a slow browser draws a part while it moves.
+/// Packs the points in an order that spreads any first part over the whole map: slow browsers draw only a
+/// part while it moves.
 fn packed(
     points: &[&MapPoint],
     extents: [[f64; 2]; 3],
@@ -120,7 +122,7 @@ fn packed(
     bytes
 }
 
-/// Where a number lies between two, on a logarithmic scale of a byte.
+/// Position of a value within a range, on a logarithmic scale of one byte.
 fn between(value: f64, [low, high]: [f64; 2]) -> u8 {
     let share = (value / low).ln() / (high / low).ln();
     (share.clamp(0.0, 1.0) * 255.0).round() as u8
@@ -141,7 +143,7 @@ fn spread(n: usize) -> impl Iterator<Item = usize> {
     (0..n).map(move |i| (i as u128 * step as u128 % n as u128) as usize)
 }
 
-/// A direction in two bytes: the octahedron around the sphere, unfolded into a square (Meyer et al.
+/// Encodes a direction in two bytes: the octahedron around the sphere, unfolded into a square (Meyer et al.
 /// 2010, On floating-point normal vectors).
 fn octahedral(normal: Vector3<f32>) -> [u8; 2] {
     let sum = normal.abs().sum();
@@ -168,7 +170,7 @@ mod tests {
             if n == 1000 {
                 let mut tens = [0; 10];
                 all[..100].iter().for_each(|i| tens[i / 100] += 1);
-                // A hundred by chance would scatter by three.
+                // A random hundred would scatter by about three.
                 assert!(tens.iter().all(|t| (7..=13).contains(t)), "{tens:?}");
             }
             all.sort_unstable();
@@ -176,7 +178,7 @@ mod tests {
         }
     }
 
-    /// Unfolded as the shader does.
+    /// Decodes as the shader does.
     #[test]
     fn normals_come_back_within_a_degree() {
         for i in 0..400 {

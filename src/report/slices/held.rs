@@ -1,28 +1,28 @@
-//! What a slice through the surface holds fixed, and the rows that belong to one slice.
+//! Which quantity a slice through the surface holds fixed, and the rows of each slice.
 
 use crate::measure::SigmaRow;
 use crate::model::{DISTANCE_RATIO, SigmaModel};
 use crate::report::numbers::{fixed, range as numbers};
 
-/// Which of distance and tilt a curve holds fixed; the other one runs along x.
+/// Which of distance and tilt a curve holds fixed; the other runs along x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Held {
     Distance,
     Tilt,
 }
 
-/// More colours and shapes than this cannot be told apart.
+/// Most groups whose colours and shapes can be told apart.
 pub(super) const MAX_GROUPS: usize = 7;
-/// Distances within a group differ by less than this: sigma ~ z^2 then by less than half.
+/// Largest ratio of distances within a group: sigma ~ z^2 then differs by a factor of at most 1.56.
 const MAX_RATIO: f64 = 1.25;
-/// Tilts within a group differ by less than this, rad: 15 degrees, half the step of a common grid.
+/// Largest difference of tilts within a group, rad: 15 degrees, half the step of a common grid.
 const MAX_TILTS_RAD: f64 = 0.262;
-/// Tilts closer than this count as one, rad: 3 degrees.
+/// Neighbouring tilts closer than this belong to one group, rad: 3 degrees.
 const ONE_TILT_RAD: f64 = 0.0524;
-/// A frontal view is never exactly frontal, rad.
+/// Tolerance below a surface's smallest tilt, rad: a frontal view is never exactly frontal.
 const FRONTAL_RAD: f64 = 0.1;
 impl Held {
-    /// x and what is held of a place.
+    /// x and the fixed quantity at a place.
     pub(super) fn split(self, z_m: f64, theta_rad: f64) -> (f64, f64) {
         match self {
             Held::Distance => (theta_rad.to_degrees(), z_m),
@@ -30,7 +30,7 @@ impl Held {
         }
     }
 
-    /// The place: z in m, theta in rad.
+    /// The place as z in m and theta in rad.
     pub(super) fn place(self, x: f64, held: f64) -> (f64, f64) {
         match self {
             Held::Distance => (held, x.to_radians()),
@@ -38,7 +38,7 @@ impl Held {
         }
     }
 
-    /// Over which a surface is known, in x.
+    /// Range of x over which a surface is valid.
     pub(super) fn along(self, model: &SigmaModel) -> [f64; 2] {
         match self {
             Held::Distance => model.domain.theta_rad.map(f64::to_degrees),
@@ -46,7 +46,7 @@ impl Held {
         }
     }
 
-    /// Was the surface measured at about this distance or tilt?
+    /// Whether the surface was measured at about this distance or tilt.
     pub(super) fn has(self, model: &SigmaModel, held: f64) -> bool {
         let ([near, far], [low, high]) = (model.domain.z_m, model.domain.theta_rad);
         match self {
@@ -55,10 +55,10 @@ impl Held {
         }
     }
 
-    /// Rows by what is held, least first, sorted inside; none of the groups is empty.
+    /// Groups rows by the fixed quantity, smallest first, and sorts each group. No group is empty.
     ///
-    /// Where the values leave gaps the groups are those of the recording; where they run on, they are
-    /// cut into equal widths (not equal counts, which would put equal values apart).
+    /// Groups are separated at gaps between the values. Where that gives too many or too wide groups, the
+    /// range is cut into equal widths; equal counts would separate equal values.
     pub(super) fn sorted(self, rows: &[SigmaRow]) -> Vec<Vec<SigmaRow>> {
         let (key, one, width): (fn(&SigmaRow) -> f64, f64, f64) = match self {
             Held::Distance => (|r| r.z_m.ln(), DISTANCE_RATIO.ln(), MAX_RATIO.ln()),
@@ -78,7 +78,7 @@ impl Held {
         sorted.chunk_by(|a, b| bin(a) == bin(b)).map(<[SigmaRow]>::to_vec).collect()
     }
 
-    /// The median, and the ends where they differ from it.
+    /// The median, with the ends where they print differently.
     pub(super) fn label(self, rows: &[SigmaRow]) -> String {
         let held = |r: &SigmaRow| self.split(r.z_m, r.theta_rad).1;
         let ends = [held(&rows[0]), held(&rows[rows.len() - 1])];
@@ -87,7 +87,7 @@ impl Held {
             Held::Distance => (median, ends, 2, " m"),
             Held::Tilt => (median.to_degrees(), ends.map(f64::to_degrees), 0, "°"),
         };
-        // Values that print alike are one.
+        // Values that print alike count as one.
         let median = fixed(median, decimals);
         let others = match numbers(ends, decimals) == median {
             true => String::new(),

@@ -27,7 +27,7 @@ fn is_overlay(layer: &Layer) -> bool {
 fn the_papers_grid_gives_seven_groups_on_a_log_axis() {
     let table = table(&[0.0, 30.0, 60.0, 76.0], [1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0]);
     let chart = figure2(&table, &SigmaModel::paper(), &Overlay::ALL, &[]);
-    // From 30 to 60 degrees more than a step of the paper's grid lies between: pieces, and no curve there.
+    // Between 30 and 60 degrees lies more than a step of the paper's grid: separate pieces, no curve between.
     assert_eq!(count(&chart, |l| matches!(l, Layer::Band(..))), 7 * 3);
     let curve = chart.layers.iter().find_map(|l| match l {
         Layer::Line(points, stroke) if stroke.dashes.is_none() => Some(points),
@@ -61,7 +61,7 @@ fn one_tilt_and_one_distance_still_draw() {
     }
 }
 
-/// Its pattern says which surface it is, its colour and mark which distance.
+/// The dash pattern tells the surface, colour and mark tell the distance.
 #[test]
 fn an_overlay_has_the_mark_of_its_distance() {
     let chart = figure2(&table(&[0.0, 9.0], [1.0, 2.0]), &SigmaModel::paper(), &Overlay::ALL, &[]);

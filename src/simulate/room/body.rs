@@ -1,4 +1,4 @@
-//! A room of bodies, and how rays from one point meet them.
+//! A room made of bodies, and where rays from one point hit them.
 
 use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 
@@ -22,8 +22,8 @@ pub struct Room {
 }
 
 impl Room {
-    /// How far a point is from the nearest surface, m, with that body's index; negative inside
-    /// furniture and behind walls.
+    /// Distance of a point from the nearest surface, m, and that body's index; negative inside furniture
+    /// and behind walls.
     pub fn clearance(&self, point: &Vector3<f64>) -> (f64, usize) {
         let of = |body: &Body| {
             let in_body = body.room_from_body.inverse_transform_point(&(*point).into());
@@ -33,7 +33,8 @@ impl Room {
         all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     }
 
-    /// A surface for each face: none is the calibration target, and a tilt lasts for one pose only.
+    /// One surface per face: none is the calibration target, and none has a fixed tilt, as that changes
+    /// with the pose.
     pub fn surfaces(&self) -> Vec<Surface> {
         let any = Surface { is_target: false, theta_rad: None };
         vec![any; self.bodies.len() * Shape::FACES]
@@ -45,14 +46,14 @@ impl Room {
     }
 }
 
-/// A room as a world in the frame of a camera that stands somewhere in it.
+/// A room as a world in the frame of a camera inside it.
 pub struct PosedRoom<'a> {
     pub room: &'a Room,
     pub room_from_camera: Isometry3<f64>,
 }
 
 impl PosedRoom<'_> {
-    /// The bodies about a point of the camera's frame, directions in that frame.
+    /// The bodies as seen from a point of the camera's frame, with ray directions in that frame.
     fn about(&self, origin: &Vector3<f64>) -> Vec<PosedBody<'_>> {
         self.room.posed(&(self.room_from_camera * Translation3::from(*origin))).collect()
     }
@@ -73,7 +74,7 @@ impl World for PosedRoom<'_> {
     }
 }
 
-/// The first surface that a ray meets.
+/// First surface that a ray hits.
 fn nearest(bodies: &[PosedBody<'_>], direction: &Vector3<f64>) -> Option<Hit> {
     let (posed, Intersection { t, face }) = first_met(bodies, direction)?;
     Some(Hit {
@@ -84,7 +85,7 @@ fn nearest(bodies: &[PosedBody<'_>], direction: &Vector3<f64>) -> Option<Hit> {
     })
 }
 
-/// The body that a ray meets first, and where; soonest found where the nearest come first.
+/// First body that a ray hits, and where; fastest when the bodies are sorted nearest first.
 #[inline]
 pub fn first_met<'a, 'b: 'a>(
     bodies: impl IntoIterator<Item = &'a PosedBody<'b>>,
@@ -106,18 +107,18 @@ pub fn first_met<'a, 'b: 'a>(
     best
 }
 
-/// A body as a camera's rays meet it: all from one point, directions in the camera's frame.
+/// A body prepared for a camera's rays: all start at one point, with directions in the camera's frame.
 pub struct PosedBody<'a> {
     pub body: &'a Body,
     pub index: usize,
     body_from_camera: Matrix3<f64>,
-    /// The camera's place in the body's frame, m.
+    /// Camera position in the body's frame, m.
     origin: Vector3<f64>,
-    /// Nearer than this no ray meets it, m.
+    /// Lower bound on the distance of a hit, m.
     pub nearest: f64,
 }
 
-/// What a bounding box covers of the ray coordinates x/z and y/z: the lowest and the highest.
+/// Bounds of a bounding box in the ray coordinates x/z and y/z: lowest and highest.
 pub type Window = [[f64; 2]; 2];
 
 const EVERYWHERE: Window = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
@@ -127,7 +128,7 @@ impl<'a> PosedBody<'a> {
         let camera_from_body = room_from_camera.inv_mul(&body.room_from_body);
         let body_from_camera = camera_from_body.inverse();
         let nearest = match body.shape {
-            // A shell is met behind everything else.
+            // A shell lies behind everything else.
             Shape::Shell(_) => f64::INFINITY,
             _ => camera_from_body.translation.vector.norm() - body.shape.radius(),
         };
@@ -140,7 +141,7 @@ impl<'a> PosedBody<'a> {
         }
     }
 
-    /// Where in the picture rays may meet it, `None` for nowhere. Never too small.
+    /// Region of the picture in which rays may hit it, `None` for nowhere. Never too small.
     pub fn window(&self) -> Option<Window> {
         let Some(half) = self.body.shape.half_size() else { return Some(EVERYWHERE) };
         let corners: [Vector3<f64>; 8] = std::array::from_fn(|k| {
@@ -153,7 +154,7 @@ impl<'a> PosedBody<'a> {
         }
         let crosses = corners.iter().any(|c| c.z <= 0.0);
         let bound = |k: usize, sign: f64| {
-            // What passes the camera's plane goes on without end to the side it is on.
+            // A box that crosses the camera plane extends to infinity on its side.
             if crosses && corners.iter().any(|c| sign * c[k] > 0.0) {
                 return sign * f64::INFINITY;
             }
@@ -168,7 +169,7 @@ impl<'a> PosedBody<'a> {
         self.body.shape.intersect(&self.origin, &(self.body_from_camera * direction))
     }
 
-    /// Point of the body's own frame at `t` along a ray, m.
+    /// Point at `t` along a ray, in the body's frame, m.
     #[inline]
     pub fn point(&self, direction: &Vector3<f64>, t: f64) -> Vector3<f64> {
         self.origin + self.body_from_camera * direction * t
@@ -180,7 +181,7 @@ impl<'a> PosedBody<'a> {
         self.body_from_camera.tr_mul(&self.body.shape.normal(point, face))
     }
 
-    /// The number of a face among [`World::surfaces`].
+    /// Index of a face in [`World::surfaces`].
     pub fn surface(&self, face: usize) -> u16 {
         (self.index * Shape::FACES + face) as u16
     }

@@ -1,4 +1,4 @@
-//! Drawing textures: rectangles, discs, mottle and lines of print, in shares of the picture.
+//! Drawing of textures: rectangles, discs, mottle and lines of print, in fractions of the picture.
 
 use rand::Rng;
 
@@ -7,7 +7,7 @@ use crate::rng::Stream;
 
 pub type Colour = [u8; 3];
 
-/// A square picture in the making. Places are shares of its side, 0 to 1, x right, y down.
+/// A square picture being drawn. Coordinates are fractions of its side, 0 to 1, x right, y down.
 pub struct Canvas {
     size: usize,
     texels: Vec<Colour>,
@@ -24,7 +24,7 @@ const LEADING: f32 = 1.2;
 
 pub const BLACK: Colour = [22, 22, 26];
 pub const WHITE: Colour = [246, 246, 242];
-/// What things are printed in.
+/// Print colours.
 #[rustfmt::skip]
 const STRONG: [Colour; 10] = [
     [178, 34, 40], [24, 78, 142], [30, 116, 66], [232, 186, 40], [222, 106, 34],
@@ -53,7 +53,7 @@ impl Canvas {
         }
     }
 
-    /// An empty frame, `line` wide.
+    /// Draws an unfilled frame, its lines `line` wide.
     pub fn frame(&mut self, [x0, y0, x1, y1]: Area, line: f32, colour: Colour) {
         self.rect([x0, y0, x1, y0 + line], colour);
         self.rect([x0, y1 - line, x1, y1], colour);
@@ -72,7 +72,7 @@ impl Canvas {
         }
     }
 
-    /// Smooth random light and dark, `cells` patches across and down, up to `depth` grey levels.
+    /// Adds smooth random brightness, `cells` patches across and down, up to `depth` grey levels.
     pub fn mottle(&mut self, cells: [usize; 2], depth: f32, rng: &mut Stream) {
         let lattice: Vec<f32> =
             (0..cells[0] * cells[1]).map(|_| rng.random_range(-depth..depth)).collect();
@@ -88,7 +88,7 @@ impl Canvas {
         }
     }
 
-    /// `count` flecks of `side`, each of one of the colours.
+    /// Draws `count` flecks of `side`, each in one of the colours.
     pub fn flecks(&mut self, count: usize, side: f32, colours: &[Colour], rng: &mut Stream) {
         for _ in 0..count {
             let (x, y): (f32, f32) = (rng.random(), rng.random());
@@ -97,7 +97,7 @@ impl Canvas {
         }
     }
 
-    /// Lines of words in an area: letters `height` high, ragged at the right, some lines short.
+    /// Draws lines of words in an area: letters `height` high, ragged at the right, some lines short.
     pub fn words(&mut self, [x0, y0, x1, y1]: Area, height: f32, colour: Colour, rng: &mut Stream) {
         let mark = height / GLYPH.1 as f32;
         let (advance, leading) = (GLYPH_CELL.0 * mark, GLYPH_CELL.1 * mark * LEADING);
@@ -135,13 +135,13 @@ pub fn any_colour(rng: &mut Stream) -> Colour {
     STRONG[rng.random_range(0..STRONG.len())]
 }
 
-/// Black or white, whichever is read better on this background.
+/// Black or white, whichever is more legible on this background.
 pub fn readable_on(background: Colour) -> Colour {
     let grey: u16 = background.iter().map(|c| u16::from(*c)).sum::<u16>() / 3;
     if grey > 125 { BLACK } else { WHITE }
 }
 
-/// A rectangle anywhere in the picture, its sides between these.
+/// A random rectangle in the picture, its sides between `min` and `max`.
 pub fn any_area(rng: &mut Stream, min: f32, max: f32) -> Area {
     let (w, h) = (rng.random_range(min..max), rng.random_range(min..max));
     let (x, y) = (rng.random_range(0.0..1.0 - w), rng.random_range(0.0..1.0 - h));

@@ -1,8 +1,7 @@
-//! An office filmed along a path: colour, depth and where the camera was.
+//! An office filmed along a path: colour, depth and the camera's trajectory.
 //!
-//! Room frame: origin on the floor in the room's middle, x and y level, z up, metres. Poses are
-//! `world_from_camera` (the world is the room) with the camera's optical frame: x right, y down,
-//! z forward.
+//! Room frame: origin on the floor in the room's middle, x and y horizontal, z up, metres. Poses are
+//! `world_from_camera` (the world is the room) with the camera's optical frame: x right, y down, z forward.
 //!
 //! ```text
 //! TUM file -trajectory-> samples -resample-> poses -place-> poses in the Room
@@ -58,11 +57,11 @@ pub struct Film {
     pub seed: Seed,
 }
 
-/// Frames in hand a thread: the slowest of one round keeps the others waiting half as long.
+/// Frames per thread and block: with two, the slowest frame keeps the other threads waiting half as long.
 const FRAMES_A_THREAD: usize = 2;
 
 impl Film {
-    /// What the TUM layout stores: 1/5000 m, and 0 for nothing.
+    /// Depth code of the TUM layout: units of 1/5000 m, and 0 for no measurement.
     pub const CODE: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
 
     /// A Kinect v1 with the intrinsics that readers of the TUM layout assume (525 px, ROS default),
@@ -74,9 +73,9 @@ impl Film {
         sensor
     }
 
-    /// Write rgb/, depth/, their lists, groundtruth.txt and recording.json into `root`, which must be
-    /// new or empty; returns how many frames show no depth at all. The bytes do not depend on the number
-    /// of threads.
+    /// Writes rgb/, depth/, their lists, groundtruth.txt and recording.json into `root`, which must be new
+    /// or empty. Returns the number of frames that show no depth at all. The bytes do not depend on the
+    /// number of threads.
     pub fn write(&self, root: &Path, progress: Progress<'_>) -> Result<usize> {
         refuse_full(root)?;
         for kind in ["rgb", "depth"] {
@@ -104,7 +103,7 @@ impl Film {
         Ok(blind)
     }
 
-    /// What was switched on and where the camera went, for a file of its own.
+    /// The seed, physics and scene as JSON, for a separate file.
     pub fn recipe(&self) -> serde_json::Value {
         serde_json::json!({
             "format": "kinoise-recipe/1",
@@ -127,7 +126,8 @@ impl Film {
         }
         write_atomic(&root.join("groundtruth.txt"), truth.as_bytes())?;
         write_recording_file(root, sensor)?;
-        // The depth list last: without it the folder is no sequence, so a kill leaves none half done.
+        // The depth list last: without it the folder is no sequence, so an interrupted run leaves none
+        // incomplete.
         for (kind, title) in [("rgb", "color images"), ("depth", "depth maps")] {
             let mut list = format!("# {title}\n# timestamp filename\n");
             for pose in &self.poses {
@@ -143,10 +143,10 @@ fn is_blind(depth: &Frame) -> bool {
     depth.raw.iter().all(|&word| Film::CODE.metres(word).is_none())
 }
 
-/// ROS' default for a PrimeSense camera, px.
+/// ROS's default for a PrimeSense camera, px.
 const TUM_FOCAL_PX: f64 = 525.0;
 
 fn file_name(pose: &Pose) -> String {
-    // As wide as a stamp of this century: names sort as the times do.
+    // As wide as a timestamp of this century, so that names sort in time order.
     format!("{:017.6}.png", pose.stamp)
 }

@@ -1,11 +1,10 @@
-//! The office, as office.json has it: two desks back to back in the middle of a furnished room.
+//! The office as described by office.json: two desks back to back in the middle of a furnished room.
 //!
-//! The file holds materials, pieces of furniture made of parts, and areas in which these and single
-//! parts stand; metres and degrees. A piece has its origin on what it stands on, z up, its user or
-//! the room at -y; a wall's area has x along the wall and the room at -y. A part stands with the
-//! middle of its bottom at its place: a cuboid or shell of this size, a drum of radius and height,
-//! a ball of this radius. A material that the file does not list is the texture of that name, once
-//! over the face.
+//! The file lists materials, pieces of furniture made of parts, and areas that hold pieces and single
+//! parts; metres and degrees. A piece has its origin at its base, z up, its user or the room at -y; a
+//! wall's area has x along the wall and the room at -y. A part's position is the middle of its bottom; its
+//! form is a cuboid or shell of this size, a drum of radius and height, or a ball of this radius. A
+//! material that the file does not list is the texture of that name, once over the face.
 
 use std::collections::HashMap;
 
@@ -83,11 +82,11 @@ struct Part {
     #[serde(flatten)]
     form: Form,
     at: [f64; 3],
-    /// Axis of a turn times its angle.
+    /// Rotation vector: axis times angle.
     #[serde(default)]
     turn_deg: [f64; 3],
     material: String,
-    /// Faces of another material.
+    /// Faces with another material.
     #[serde(default)]
     faces: HashMap<String, String>,
 }
@@ -102,7 +101,7 @@ enum Form {
 }
 
 impl Room {
-    /// The seed draws what is printed on things, and moves nothing.
+    /// Builds the office. The seed draws what is printed on things, and moves nothing.
     pub fn office(seed: Seed) -> Room {
         let (names, textures): (Vec<String>, _) = textures::draw(seed).into_iter().unzip();
         Room { bodies: Scene::read().unwrap_or_default().bodies(&names), textures }
@@ -114,7 +113,7 @@ fn pose(at: [f64; 3], turn_deg: [f64; 3]) -> Isometry3<f64> {
 }
 
 impl Scene {
-    /// The file is a part of the program: a test reads it.
+    /// Parses the file, which is compiled in; a test checks that it can be read.
     fn read() -> serde_json::Result<Self> {
         serde_json::from_str(include_str!("office.json"))
     }
@@ -188,7 +187,7 @@ impl Form {
 mod tests {
     use super::*;
 
-    /// No name in the file leads nowhere.
+    /// Every name in the file refers to something that exists.
     #[test]
     fn the_file_is_read_whole() {
         let scene = Scene::read().unwrap();

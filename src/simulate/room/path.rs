@@ -1,5 +1,5 @@
-//! The path that is filmed: once around the desks, or a recorded one at the sensor's frame rate, fitted
-//! into the room by a rigid motion that keeps its vertical.
+//! The camera path: once around the desks, or a recorded trajectory resampled to the sensor's frame rate
+//! and fitted into the room by a rigid motion that keeps the vertical.
 
 use std::f64::consts::TAU;
 
@@ -13,20 +13,20 @@ use crate::error::{Error, Result};
 use crate::simulate::RATE_HZ;
 use crate::trajectory::Pose;
 
-/// For one round, s: 0.28 m/s, between freiburg2_desk (0.19) and freiburg1_desk (0.41 m/s).
+/// Time for one round, s: 0.28 m/s, between freiburg2_desk (0.19) and freiburg1_desk (0.41 m/s).
 const ROUND_S: f64 = 40.0;
-/// Mean distance from the desks' middle and height, m, with their slow changes: a person walks
-/// and holds the sensor at shoulder height.
+/// Distance from the desks' middle and height, m, each with mean and amplitude: a person walks and holds
+/// the sensor at shoulder height.
 const RADIUS_M: [f64; 2] = [1.8, 0.2];
 const HEIGHT_M: [f64; 2] = [1.4, 0.12];
-/// Whole numbers of changes a round, so that the path closes.
+/// Oscillations per round, whole numbers so that the path closes.
 const RADIUS_CHANGES: f64 = 3.0;
 const HEIGHT_CHANGES: f64 = 5.0;
-/// What is looked at, m: the desk tops' middle, and how far the gaze wanders from it.
+/// Gaze target, m: the desk tops' middle, and how far the gaze wanders from it.
 const GAZE: Vector3<f64> = Vector3::new(0.0, 0.0, 0.55);
 const WANDER_M: f64 = 0.25;
 
-/// At 30 Hz from 0 s, in the room's frame.
+/// Path around the desks at 30 Hz from 0 s, in the room's frame.
 pub fn around_the_desks() -> Vec<Pose> {
     let frames = (ROUND_S * RATE_HZ) as usize;
     (0..frames).map(|k| walk(k as f64 / RATE_HZ)).collect()
@@ -36,13 +36,13 @@ fn walk(stamp: f64) -> Pose {
     let turn = TAU * stamp / ROUND_S;
     let radius = RADIUS_M[0] + RADIUS_M[1] * (RADIUS_CHANGES * turn).sin();
     let height = HEIGHT_M[0] + HEIGHT_M[1] * (HEIGHT_CHANGES * turn).sin();
-    // Begins at the first desk's user, on the -y side.
+    // Starts at the seat of the first desk, on the -y side.
     let eye = Vector3::new(radius * turn.sin(), -radius * turn.cos(), height);
     let wander = Vector3::new((4.0 * turn).sin(), (3.0 * turn).cos(), 0.5 * (5.0 * turn).cos());
     Pose { stamp, world_from_camera: looking(eye, GAZE + WANDER_M * wander) }
 }
 
-/// Level, from `eye` towards `target`: z forward, y down.
+/// Camera pose without roll, from `eye` towards `target`: z forward, y down.
 pub fn looking(eye: Vector3<f64>, target: Vector3<f64>) -> Isometry3<f64> {
     let forward = (target - eye).normalize();
     let right = forward.cross(&Vector3::z()).normalize();
@@ -51,7 +51,7 @@ pub fn looking(eye: Vector3<f64>, target: Vector3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(eye), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// A stretch without samples, s.
+/// An interval without samples, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     pub from: f64,
@@ -64,25 +64,25 @@ impl Gap {
     }
 }
 
-/// Poses at 30 Hz, and the gaps that were glided through.
+/// Poses at 30 Hz, and the gaps that were interpolated across.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resampled {
     pub poses: Vec<Pose>,
     pub gaps: Vec<Gap>,
 }
 
-/// Six frames: a trajectory sampled at 5 Hz or more has no gaps.
+/// Longest interval that is no gap, s: six frames, so a trajectory sampled at 5 Hz or more has no gaps.
 const GAP_S: f64 = 0.2;
-/// A finite difference over less is mostly the tracker's own noise (0.1 mm at 300 Hz), s.
+/// Span of a finite difference, s; over less it is mostly the tracker's noise (0.1 mm at 300 Hz).
 const SPEED_SPAN_S: f64 = 0.03;
-/// An hour's frames; more is stamps that are not in seconds.
+/// An hour of frames; more means that the timestamps are not in seconds.
 const MAX_FRAMES: f64 = 3600.0 * RATE_HZ;
 
-/// Poses at 30 Hz from poses at any times, from the first sample to the last; at most `limit`.
+/// Resamples poses at arbitrary times to 30 Hz, from the first sample to the last; at most `limit`.
 ///
-/// Translation: cubic Hermite between the neighbouring samples; rotation: slerp. Across a gap the
-/// speed at its ends is kept no larger than the gap's own, so that the camera glides through: a
-/// cubic with end speeds v leaves the chord by at most 4/27 of v times the time it has.
+/// Translation: cubic Hermite between the neighbouring samples; rotation: slerp. Across a gap the end
+/// speeds are limited to the gap's mean speed, so that the camera moves smoothly: a cubic with end speeds v
+/// leaves the chord by at most 4/27 of v times the duration.
 ///
 /// # Panics
 /// When `samples` is empty; [`crate::trajectory::read_trajectory`] returns at least one.
@@ -141,7 +141,7 @@ fn hermite(u: f64, ends: [Vector3<f64>; 2], tangents: [Vector3<f64>; 2]) -> Vect
         + tangents[1] * (cube - square)
 }
 
-/// Speed at a sample, m/s: over its neighbours on both sides, but not across a gap.
+/// Velocity at a sample, m/s: finite difference over its neighbours on both sides, but not across a gap.
 fn speed(samples: &[Pose], i: usize) -> Vector3<f64> {
     let (mut first, mut last) = (i, i);
     let seconds = |i: usize, j: usize| samples[j].stamp - samples[i].stamp;
@@ -159,10 +159,10 @@ fn speed(samples: &[Pose], i: usize) -> Vector3<f64> {
     (position(b) - position(a)) / (b.stamp - a.stamp)
 }
 
-/// The sensor keeps this far from everything, m: half the width of a Kinect (0.28 m).
+/// Least distance of the sensor from everything, m: half the width of a Kinect (0.28 m).
 pub const CLEARANCE_M: f64 = 0.14;
 
-/// Where a path lies in the room.
+/// Placement of a path in the room.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     pub room_from_world: Isometry3<f64>,
@@ -180,19 +180,19 @@ impl Placement {
     }
 }
 
-/// Directions that are tried, all round.
+/// Number of orientations tried about the vertical.
 const TURNS: usize = 24;
-/// Heights at which a hand holds a sensor, m; a path outside was not measured from the floor.
+/// Heights of a hand-held sensor, m; a path outside was not measured from the floor.
 const HELD_M: [f64; 2] = [0.4, 2.2];
-/// Shoulder height: where the middle of such a path goes, m.
+/// Shoulder height, m: the middle of such a path is moved here.
 const SHOULDER_M: f64 = 1.45;
-/// Where a sensor that is carried on looks when its path does not say, m ahead.
+/// Assumed distance of the gaze point when the path does not determine it, m ahead.
 const AHEAD_M: f64 = 1.3;
-/// A point that is looked at from more than a room away is none, m.
+/// Farthest gaze point from the path's middle, m: one more than a room away is rejected.
 const GAZE_REACH_M: f64 = 4.0;
 
-/// Place a path with z up so that what it looks at is the desks, or else so that its middle is the
-/// room's; an error when it comes too near to furniture or walls however it is placed.
+/// Places a path with z up so that its gaze point is at the desks, or else so that its middle is the
+/// room's. Returns an error when every placement comes too near to furniture or walls.
 pub fn place(room: &Room, poses: &[Pose]) -> Result<Placement> {
     let mut reached = f64::NEG_INFINITY;
     for anchor in anchors(poses) {
@@ -227,14 +227,14 @@ fn turned(room: &Room, poses: &[Pose], anchor: Vector2<f64>, turn: usize) -> Pla
     Placement { room_from_world, clearance_m: along.fold(f64::INFINITY, f64::min) }
 }
 
-/// How far the path is lifted: not at all where its heights are a hand's.
+/// Vertical shift of the path, m: zero where its heights are those of a hand-held sensor.
 fn lift(poses: &[Pose]) -> f64 {
     let (low, high) = bounds(poses);
     let held = low.z >= HELD_M[0] && high.z <= HELD_M[1].min(CEILING_M);
     if held { 0.0 } else { SHOULDER_M - 0.5 * (low.z + high.z) }
 }
 
-/// Points of the path's floor plan that may become the room's middle, the best first.
+/// Points of the path's floor plan that may become the room's middle, best first.
 fn anchors(poses: &[Pose]) -> Vec<Vector2<f64>> {
     let (low, high) = bounds(poses);
     let middle = 0.5 * (low + high).xy();
@@ -248,10 +248,10 @@ fn level_gaze(pose: &Pose) -> Vector2<f64> {
     (pose.world_from_camera.rotation * Vector3::z()).xy()
 }
 
-/// Eigenvalue ratio below which lines of sight are parallel: 0.02 is a spread of some 8 degrees.
+/// Eigenvalue ratio below which lines of sight count as parallel: 0.02 is a spread of some 8 degrees.
 const PARALLEL: f64 = 0.02;
 
-/// The point of the floor plan nearest to all lines of sight.
+/// Least-squares intersection of all lines of sight in the floor plan; `None` if they are parallel.
 fn looked_at(poses: &[Pose]) -> Option<Vector2<f64>> {
     let (mut matrix, mut vector) = (Matrix2::zeros(), Vector2::zeros());
     for pose in poses {

@@ -1,8 +1,8 @@
 //! What a camera sees of a room: depth, normals and colour of every pixel.
 //!
-//! The picture is cut into small tiles; a ray meets only the bodies whose bounding box covers some
-//! of its tile. Colour is Lambert's law under two ceiling lamps, what the white walls give back from
-//! everywhere, and the texture as far as a pixel resolves it.
+//! The picture is cut into small tiles; a ray is tested only against bodies whose bounding box overlaps its
+//! tile. Colour is Lambertian shading by two ceiling lamps, ambient light reflected by the white walls, and
+//! the texture as far as a pixel resolves it.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -20,7 +20,7 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
-/// Pixels a side of a tile.
+/// Side of a tile, px.
 const TILE: usize = 8;
 
 struct Tile {
@@ -33,7 +33,7 @@ impl Tile {
         let (right, bottom) = ((left + TILE).min(camera.width), (top + TILE).min(camera.height));
         let row = |v: usize| (left..right).map(move |u| v * camera.width + u);
         let pixels: Vec<usize> = (top..bottom).flat_map(row).collect();
-        // Softened edges look half a pixel beyond the outermost rays.
+        // Softened edges sample a third of a pixel beyond the outermost rays.
         let margin = 1.0 / camera.fx.min(camera.fy);
         let mut window = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for (x, y) in pixels.iter().map(|&i| rays.at(i)) {
@@ -63,7 +63,7 @@ impl<'a> RoomCamera<'a> {
         RoomCamera { room, camera, rays, tiles }
     }
 
-    /// From this pose; on one thread.
+    /// Takes a picture from this pose, on one thread.
     pub fn take(&self, world_from_camera: &Isometry3<f64>) -> Picture {
         let view = View::new(self, world_from_camera);
         let mut picture = self.blank();
@@ -101,7 +101,7 @@ impl<'a> RoomCamera<'a> {
         }
     }
 
-    /// A pixel's ray, its z one.
+    /// A pixel's ray, scaled to z = 1.
     fn direction(&self, i: usize) -> Vector3<f64> {
         let (x, y) = self.rays.at(i);
         Vector3::new(x, y, 1.0)
@@ -112,7 +112,7 @@ impl<'a> RoomCamera<'a> {
 struct View<'a> {
     camera: &'a RoomCamera<'a>,
     light: Light,
-    /// What may be in the picture, the nearest first.
+    /// Bodies that may be visible, nearest first.
     bodies: Vec<(PosedBody<'a>, Window)>,
 }
 
@@ -153,7 +153,7 @@ impl<'a> View<'a> {
         put(&mut picture.rgb, i, self.colour(&met, &direction));
     }
 
-    /// Mean of the pixel's middle and of rays beside it, where several bodies share the pixel.
+    /// Anti-aliased colour of a pixel on an edge: mean of its middle and of rays beside it.
     fn softened(&self, i: usize, middle: [f32; 3], bodies: &[&PosedBody<'_>]) -> [f32; 3] {
         let Camera { fx, fy, .. } = self.camera.camera;
         let mut sum = middle;
@@ -173,7 +173,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// Beside the middle, px: with it, three rays in three thirds of the pixel, across and down.
+/// Sample offsets from the middle, px: with it, three rays in three thirds of the pixel, across and down.
 const WITHIN_PIXEL: [[f64; 2]; 2] = [[-0.33, 0.33], [0.33, -0.33]];
 
 fn put(rgb: &mut [u8], i: usize, colour: [f32; 3]) {
@@ -182,7 +182,7 @@ fn put(rgb: &mut [u8], i: usize, colour: [f32; 3]) {
     }
 }
 
-/// Does a neighbour to the right, left, above or below show another face?
+/// Whether a neighbour to the right, left, above or below shows another face.
 fn is_edge(seen: &Seen, i: usize) -> bool {
     let (u, v) = (i % seen.width, i / seen.width);
     let other = |j: usize| seen.surface[j] != seen.surface[i];
@@ -194,26 +194,28 @@ fn is_edge(seen: &Seen, i: usize) -> bool {
 
 struct Lamp {
     at: Vector3<f32>,
-    /// Brightness it gives a white surface 1 m below it, as a share of display white.
+    /// Brightness that a point lamp would give a white surface 1 m below it, as a share of display white.
     power: f32,
 }
 
-/// Above either long side of the desks, 2.7 m high; together they light a desk top to about 0.7.
+/// Above either long side of the desks, 2.7 m high; together they add about 0.35 on a desk top.
 const LAMPS: [Lamp; 2] = [
     Lamp { at: Vector3::new(-0.4, 1.5, 2.7), power: 1.7 },
     Lamp { at: Vector3::new(0.4, -1.5, 2.7), power: 1.7 },
 ];
-/// What comes back from walls and ceiling, on faces turned up, and the loss on those turned down.
+/// Light reflected by walls and ceiling on vertical faces, and its gain on faces turned up (or loss on
+/// those turned down).
 const AMBIENT: f32 = 0.5;
 const AMBIENT_SLOPE: f32 = 0.1;
-/// A lamp is a tube, not a point: its light falls off more slowly near by, m.
+/// Size of a lamp, m: a tube, not a point, so that its light falls off more slowly near by.
 const LAMP_SIZE_M: f32 = 1.2;
-/// Cosine below which a grazing surface blurs no further.
+/// Least cosine of incidence in the choice of a texture level: more grazing surfaces blur no further.
 const FLATTEST: f64 = 0.05;
-/// Levels: a camera's own sharpening, and corners stay corners. Half a level does not flicker.
+/// Bias of the texture level: imitates a camera's sharpening and keeps corners; half a level does not
+/// flicker.
 const SHARPEN: f32 = -0.5;
 
-/// The lamps as one camera has them about itself: what is seen needs no turning into the room.
+/// The lamps in one camera's frame, so that surface points need no transformation into the room.
 pub struct Light {
     lamps: [Lamp; 2],
     up: Vector3<f32>,
@@ -229,8 +231,8 @@ impl Light {
         Light { lamps, up: camera_from_room * Vector3::z() }
     }
 
-    /// Share of display white that a white surface shows at a point (m), with this unit normal,
-    /// both in the camera's frame; may exceed one near a lamp.
+    /// Brightness of a white surface at a point (m) with this unit normal, both in the camera's frame, as a
+    /// share of display white; may exceed one near a lamp.
     #[inline]
     fn on(&self, point: &Vector3<f32>, normal: &Vector3<f32>) -> f32 {
         let direct = self.lamps.iter().map(|lamp| {
@@ -243,7 +245,7 @@ impl Light {
     }
 }
 
-/// Where a ray ended.
+/// Where a ray hit a surface.
 pub struct SurfacePoint<'a> {
     pub posed: &'a PosedBody<'a>,
     pub at: Intersection,
@@ -275,7 +277,7 @@ impl<'a> SurfacePoint<'a> {
         let size = body.shape.face_size(face).cast::<f32>();
         let (uv, density) = material.coordinates(place.into(), size.into());
         let texture = &textures[material.texture];
-        // A pixel covers (t / f)^2 / cos: half the logarithm of its area in texels.
+        // A pixel covers (t / f)^2 / cos m^2. The level is half the logarithm of its area in texels.
         let tilt = (self.normal.dot(direction).abs() / direction.norm()).max(FLATTEST);
         let side_m = t / focal_px;
         let side_texels = texture.size() as f32;

@@ -1,5 +1,5 @@
-//! The bodies a room is made of, each in its own coordinates: where a ray meets it, which way it
-//! faces there, and how far a point is from it.
+//! The shapes a room is made of, each in its own frame: ray intersection, surface normal, and distance of a
+//! point.
 
 use std::f64::consts::{PI, TAU};
 
@@ -22,7 +22,7 @@ pub enum Shape {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
-    /// In units of the ray's direction.
+    /// Ray parameter, in units of the ray's direction.
     pub t: f64,
     /// See [`Shape::FACES`].
     pub face: usize,
@@ -32,7 +32,7 @@ impl Shape {
     /// Cuboid and shell: -x, +x, -y, +y, -z, +z. Drum: side, bottom, top. Ball: one.
     pub const FACES: usize = 6;
 
-    /// Radius of the sphere about the origin that holds it, m.
+    /// Radius of the bounding sphere about the origin, m.
     pub fn radius(&self) -> f64 {
         match *self {
             Shape::Cuboid(half) | Shape::Shell(half) => half.norm(),
@@ -41,7 +41,7 @@ impl Shape {
         }
     }
 
-    /// The first at t > 0; a ray that starts inside a closed body has none.
+    /// First intersection at t > 0; `None` for a ray that starts inside a closed body.
     #[inline]
     pub fn intersect(&self, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
         match self {
@@ -52,7 +52,7 @@ impl Shape {
         }
     }
 
-    /// Half the size of its bounding box, m; a shell is all round.
+    /// Half the size of its bounding box, m; `None` for a shell, which surrounds everything.
     pub fn half_size(&self) -> Option<Vector3<f64>> {
         match *self {
             Shape::Cuboid(half) => Some(half),
@@ -77,8 +77,8 @@ impl Shape {
         }
     }
 
-    /// Coordinates on the surface, m: to the right and down for somebody who faces it upright
-    /// (on level faces x and -y).
+    /// Coordinates on the surface, m: right and down for an upright viewer facing it (on horizontal faces x
+    /// and -y; on the bottom of a cuboid -x and -y).
     #[inline]
     pub fn face_place(&self, point: &Vector3<f64>, face: usize) -> Vector2<f64> {
         let p = point;
@@ -118,7 +118,8 @@ impl Shape {
         }
     }
 
-    /// How far a point is from where it must not be, m: inside a body, or outside a shell.
+    /// Signed distance of a point from the forbidden region, m: the inside of a body, or the outside of a
+    /// shell.
     pub fn clearance(&self, point: &Vector3<f64>) -> f64 {
         match self {
             Shape::Cuboid(half) => outside(&(point.abs() - half)),
@@ -139,12 +140,12 @@ fn axis(face: usize) -> Vector3<f64> {
     normal
 }
 
-/// Distance of a point from a product of intervals, given by how much it overshoots in each.
+/// Signed distance of a point from a product of intervals, given its excess over each.
 fn outside(over: &Vector3<f64>) -> f64 {
     over.map(|v| v.max(0.0)).norm() + over.max().min(0.0)
 }
 
-/// What three slabs share: where a ray enters and leaves it, and through which face it enters.
+/// Slab method: intersects the ray's intervals in three slabs, and tells the face through which it enters.
 #[inline]
 fn hit_cuboid(half: &Vector3<f64>, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (mut near, mut far, mut face) = (f64::NEG_INFINITY, f64::INFINITY, 0);
@@ -182,7 +183,7 @@ fn hit_ball(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersect
     (t > 0.0).then_some(Intersection { t, face: 0 })
 }
 
-/// An endless cylinder and a slab, what they share.
+/// Intersects a ray with the intersection of an infinite cylinder and a slab.
 fn hit_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<Intersection> {
     let (side_in, side_out) = across_cylinder(radius, o, d)?;
     let inverse = 1.0 / d.z;
@@ -197,7 +198,7 @@ fn hit_drum(radius: f64, half: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Optio
     (near <= side_out.min(cap_out) && near > 0.0).then_some(Intersection { t: near, face })
 }
 
-/// Where a ray enters and leaves the endless cylinder.
+/// Where a ray enters and leaves the infinite cylinder.
 fn across_cylinder(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<(f64, f64)> {
     let a = d.x * d.x + d.y * d.y;
     let b = o.x * d.x + o.y * d.y;

@@ -28,14 +28,14 @@ pub struct Shutter<'a> {
     depth: DepthCamera<'a>,
 }
 
-/// How depth comes about.
+/// How depth frames are made.
 enum DepthCamera<'a> {
     Formula {
         sensor: FormulaSensor<'a>,
         sigma: SigmaLookup,
         memory: Memory,
     },
-    /// Its words in the code of `code`.
+    /// Its words are converted to `code`.
     Speckle {
         sensor: Box<SpeckleSensor>,
         code: DepthCode,
@@ -43,14 +43,14 @@ enum DepthCamera<'a> {
 }
 
 impl<'a> Shutter<'a> {
-    /// `sensor` and `rays` are those of one camera; its code is that of the words.
+    /// `sensor` and `rays` describe the same camera; depth words are written in the sensor's code.
     pub fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Self {
         let depth = match &film.physics {
             Physics::Formula { sigma, effects } => {
                 DepthCamera::formula(sensor, rays, sigma, effects, film)
             }
             Physics::Speckle { causes } => DepthCamera::Speckle {
-                // The sensor's words are those of its read-out; what is written has another code.
+                // The sensor's words have the code of its read-out; what is written has another.
                 sensor: Box::new(SpeckleSensor::new(&film.sensor, causes.clone())),
                 code: sensor.code,
             },
@@ -58,7 +58,7 @@ impl<'a> Shutter<'a> {
         Shutter { film, camera: RoomCamera::new(&film.room, &sensor.camera, rays), depth }
     }
 
-    /// Consecutive frames: what an effect remembers goes from one to the next.
+    /// Takes consecutive frames; the effects' memory carries over from one to the next.
     pub fn shoot(&mut self, frames: Range<usize>) -> Vec<(Picture, Frame)> {
         let poses = &self.film.poses[frames.clone()];
         let picture = |pose: &Pose| self.camera.take(&pose.world_from_camera);
@@ -102,7 +102,7 @@ impl<'a> DepthCamera<'a> {
                     *memory = shooting.memory;
                     shot.depth
                 };
-                // Effects of the catalogue may remember: then frames go in order.
+                // Catalogue effects may have a memory: then frames are taken in order.
                 if sensor.effects.iter().all(|a| matches!(a.effect, Acting::Shape(_))) {
                     return seen.par_iter().map(|s| shoot(s, &mut Memory::new())).collect();
                 }
@@ -124,7 +124,7 @@ impl<'a> DepthCamera<'a> {
     }
 }
 
-/// Of every pixel, m; zero where there is nothing.
+/// Sigma of every pixel, m; zero where nothing is seen.
 fn sigma_of(seen: &Seen, sigma: &SigmaLookup) -> Vec<f32> {
     let of = |(&z, normal): (&f32, &[f32; 3])| {
         let theta = normal[2].abs().min(1.0).acos();

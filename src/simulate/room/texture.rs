@@ -1,7 +1,7 @@
-//! What a surface looks like: a picture with its smaller copies, so that far texture blurs and does
-//! not flicker, how it lies there, and its answer to infrared.
+//! Appearance of surfaces: mip-mapped textures, so that distant ones blur instead of flickering, their
+//! mapping onto faces, and the infrared reflectance.
 
-/// A square picture that repeats, and its halvings down to one texel.
+/// A square, repeating texture with its mip levels down to one texel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     levels: Vec<Level>,
@@ -9,17 +9,17 @@ pub struct Texture {
 
 #[derive(Debug, Clone, PartialEq)]
 struct Level {
-    /// Texels a side, a power of two.
+    /// Texels per side, a power of two.
     size: usize,
-    /// Red, green, blue and nothing: four bytes are one load.
+    /// Red, green, blue and padding: four bytes are one load.
     texels: Vec<[u8; 4]>,
 }
 
 impl Texture {
-    /// Of `size` by `size` texels, row by row.
+    /// A texture of `size` by `size` texels, row-major.
     ///
     /// # Panics
-    /// When `size` is no power of two or does not fit the texels.
+    /// If `size` is not a power of two or does not match the texels.
     pub fn new(size: usize, texels: Vec<[u8; 3]>) -> Self {
         assert!(size.is_power_of_two() && texels.len() == size * size, "a square picture");
         let padded = texels.iter().map(|&[r, g, b]| [r, g, b, 0]).collect();
@@ -34,14 +34,14 @@ impl Texture {
         self.levels[0].size
     }
 
-    /// Colour, 0 to 255, at `uv` (in pictures; repeats), where a pixel covers 2^`lod` texels.
+    /// Colour, 0 to 255, at `uv` (in units of the texture; repeats), where a pixel spans 2^`lod` texels.
     #[inline]
     pub fn at(&self, uv: [f32; 2], lod: f32) -> [f32; 3] {
         let uv = uv.map(fraction);
         let top = (self.levels.len() - 1) as f32;
         let lod = lod.clamp(0.0, top);
         let fine = lod as usize;
-        // Half of all places see one level only; the blend between two stays continuous.
+        // Half of all samples read one level only; the blend between two stays continuous.
         let share = (2.0 * (lod - fine as f32) - 0.5).clamp(0.0, 1.0);
         let one = |level: usize| {
             let [r, g, b, _] = self.levels[level].at(uv);
@@ -70,10 +70,10 @@ impl Level {
         Level { size, texels }
     }
 
-    /// Between the four nearest texel centres; `uv` in [0, 1].
+    /// Bilinear interpolation between the four nearest texel centres; `uv` in [0, 1].
     #[inline]
     fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        // A whole picture more keeps the numbers positive, and the mask takes it off again.
+        // One more period keeps the numbers positive; the mask removes it again.
         let [x, y] = uv.map(|v| (v + 1.0) * self.size as f32 - 0.5);
         let (left, up) = (x as usize, y as usize);
         let (s, t) = (x - left as f32, y - up as f32);
@@ -90,14 +90,14 @@ impl Level {
     }
 }
 
-/// The part of a number after the point, 0 to 1. (`floor` is a call on a plain x86-64.)
+/// Fractional part, 0 to 1. (`floor` is a function call on baseline x86-64.)
 #[inline]
 pub fn fraction(v: f32) -> f32 {
     let rest = v - v as i32 as f32;
     if rest < 0.0 { rest + 1.0 } else { rest }
 }
 
-/// log2, straight between the powers of two: at most 0.09 too low, a tenth of a level.
+/// log2, linear between the powers of two: at most 0.09 too low, a tenth of a level.
 #[inline]
 pub fn rough_log2(v: f32) -> f32 {
     const ONE: f32 = 127.0;
@@ -109,10 +109,10 @@ pub fn rough_log2(v: f32) -> f32 {
 pub enum Mapping {
     /// Once over the whole face.
     Fit,
-    /// Again every so many metres.
+    /// Repeated with this period, m.
     Repeat(f32),
-    /// In square tiles of this side, m, each cut from another place of the texture, which is
-    /// `of_m` wide: no two tiles look alike, and nothing can be mistaken for its neighbour.
+    /// In square tiles of this side, m, each cut from another place of the texture, which is `of_m` wide:
+    /// no two tiles look alike, so none can be mistaken for its neighbour.
     Tiles { side_m: f32, of_m: f32 },
 }
 
@@ -123,9 +123,9 @@ pub struct Material {
     pub mapping: Mapping,
     /// Factor on red, green and blue.
     pub tint: [f32; 3],
-    /// Share of the colour that shines by itself (screens, lamps), 0 to 1.
+    /// Share of the colour that is emitted (screens, lamps), 0 to 1.
     pub emission: f32,
-    /// Share of infrared light given back, 0 to 1.
+    /// Infrared reflectance, 0 to 1.
     pub albedo: f32,
 }
 
@@ -137,7 +137,8 @@ impl Material {
         Material { texture, mapping, tint: [1.0; 3], emission: 0.0, albedo: MATT }
     }
 
-    /// Texture coordinates (in pictures) of a place on a face of this `size`, and pictures per m^2.
+    /// Texture coordinates (in units of the texture) of a place on a face of this `size`, and textures per
+    /// m^2.
     #[inline]
     pub fn coordinates(&self, place: [f32; 2], size: [f32; 2]) -> ([f32; 2], f32) {
         match self.mapping {
@@ -161,11 +162,11 @@ impl Material {
     }
 }
 
-/// Two numbers in [0, 1) without a visible pattern: the fractions of multiples of the plastic
-/// number's powers (Roberts' R2 sequence), by the cell, whose numbers are whole.
+/// Two numbers in [0, 1) per cell without a visible pattern: Roberts' R2 sequence, the fractional parts of
+/// multiples of the plastic number's powers. Cell numbers are whole.
 fn scatter(cell: [f32; 2]) -> [f32; 2] {
     const R2: [f32; 2] = [0.754_877_7, 0.569_840_3];
-    // A difference of floats: whole only to rounding, so made whole (a room has +-100 tiles).
+    // A difference of floats, whole only up to rounding, hence rounded (a room has +-100 tiles).
     let [i, j] = cell.map(|c| (c + 1000.5) as i32);
     let index = (57 * i + 131 * j) as f32;
     R2.map(|r| fraction(index * r))

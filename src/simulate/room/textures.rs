@@ -1,7 +1,6 @@
-//! The office's textures, drawn by the seed: what things are made of, and what is printed on them
-//! or shown by screens.
+//! The office's textures, drawn from the seed: materials, prints and screens.
 //!
-//! Each has sharp structure at several scales, so that corners are found from near and from afar.
+//! Each has sharp structure at several scales, so that corners are found from near and far.
 
 use rand::Rng;
 
@@ -11,7 +10,7 @@ use crate::rng::{Seed, Stream};
 
 type Draw = fn(&mut Stream) -> Canvas;
 
-/// What is drawn: its name, how many there are, each different, and how.
+/// Kinds of texture: name, number of different ones, and drawing function.
 const KINDS: [(&str, usize, Draw); 17] = [
     ("plain", 1, plain),
     ("plaster", 1, plaster),
@@ -32,7 +31,7 @@ const KINDS: [(&str, usize, Draw); 17] = [
     ("label", 3, label),
 ];
 
-/// All of them by name ("wood", "page/3"), each from a stream of its own.
+/// Draws all of them by name ("wood", "page/3"), each from its own random stream.
 pub fn draw(seed: Seed) -> Vec<(String, Texture)> {
     let one = |(kind, count, draw): (&str, usize, Draw), k: usize| {
         let name = if count == 1 { kind.to_string() } else { format!("{kind}/{k}") };
@@ -146,7 +145,7 @@ fn ball(rng: &mut Stream) -> Canvas {
     c
 }
 
-/// Six rows of keys, three to one.
+/// Six rows of keys, for a face three times as wide as high.
 pub fn keys(rng: &mut Stream) -> Canvas {
     let mut c = Canvas::new(256, [40, 40, 44]);
     for row in 0..6 {
@@ -271,7 +270,7 @@ pub fn carton(rng: &mut Stream) -> Canvas {
     c
 }
 
-/// What is printed round a cup or a tin.
+/// Print around a cup or a tin.
 pub fn label(rng: &mut Stream) -> Canvas {
     let background = any_colour(rng);
     let mut c = Canvas::new(256, background);

@@ -1,5 +1,5 @@
-//! What can be set about the simulated Kinect (causes, never errors), and how sensor and target then
-//! stand at one instant: temperature and motion.
+//! Settings of the simulated Kinect (causes, never errors), and the state of sensor and target at one
+//! instant: temperature and motion.
 
 use nalgebra::Vector3;
 
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::plane::Plane;
 use crate::scene::Bench;
 
-/// What can be otherwise about the sensor, the light, the room and the bench.
+/// Settings of the sensor, the light, the room and the bench.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Causes {
     pub window_px: f64,
@@ -29,24 +29,24 @@ pub struct Causes {
     pub motion_mps: f64,
 }
 
-/// A cause for people and for the command line.
+/// Description of a cause, for people and the command line.
 #[derive(Debug, Clone, Copy)]
 pub struct Cause {
     pub name: &'static str,
     pub unit: &'static str,
-    /// What is accepted.
+    /// Accepted values.
     pub range: [f64; 2],
-    /// Its value when it is not set.
+    /// Default value.
     pub usual: f64,
-    /// What it is, and where the usual value comes from.
+    /// Meaning, and source of the default.
     pub description: &'static str,
     value: fn(&mut Causes) -> &mut f64,
 }
 
-/// One line a cause: field, unit, range, usual value, description.
+/// One line per cause: field, unit, range, default, description.
 macro_rules! causes {
     ($($name:ident [$unit:literal] $low:literal ..= $high:literal, $usual:literal: $description:literal;)*) => {
-        /// Every cause there is.
+        /// All causes.
         pub static KNOWN_CAUSES: &[Cause] = &[$(Cause {
             name: stringify!($name),
             unit: $unit,
@@ -107,7 +107,7 @@ fn fault(what: String) -> Error {
 }
 
 impl Causes {
-    /// `self` with one cause set; an error where there is none, or the value is outside its range.
+    /// `self` with one cause set. Returns an error for an unknown name or a value outside its range.
     pub fn with(mut self, name: &str, value: f64) -> Result<Self> {
         let cause = KNOWN_CAUSES.iter().find(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = KNOWN_CAUSES.iter().map(|c| c.name).collect();
@@ -139,7 +139,7 @@ impl Causes {
         self.with(name.trim(), number)
     }
 
-    /// By name, for the recipe.
+    /// All values by name, for the recipe.
     pub fn values(&self) -> serde_json::Map<String, serde_json::Value> {
         let mut causes = self.clone();
         KNOWN_CAUSES
@@ -148,22 +148,22 @@ impl Causes {
             .collect()
     }
 
-    /// Half the matching window without its middle, px.
+    /// Half the matching window, without its middle pixel, px.
     pub(super) fn half_window(&self) -> usize {
         (self.window_px as usize) / 2
     }
 }
 
-/// What changes from frame to frame beside the noise.
+/// State that changes from frame to frame, besides the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moment {
-    /// Above the temperature at which the reference was recorded, K.
+    /// Temperature above that of the reference recording, K.
     pub warmth_k: f64,
-    /// How far the target has moved away since the view began, m.
+    /// Distance by which the target has moved away since the view began, m.
     pub moved_m: f64,
 }
 
-/// Of a Kinect v1's laser, nm.
+/// Wavelength of a Kinect v1's laser, nm.
 pub const WAVELENGTH_NM: f64 = 830.0;
 /// A surface that has moved by about a millimetre shows new speckle.
 const SPECKLE_LENGTH_M: f64 = 1e-3;
@@ -177,12 +177,12 @@ impl Moment {
         Moment { warmth_k: causes.warm_up_k * share, moved_m: causes.motion_mps * instant.view_s }
     }
 
-    /// Counts the speckle patterns of a view: the same while the target stands.
+    /// Number of the speckle pattern within a view: constant while the target stands still.
     pub fn speckle_epoch(&self) -> i64 {
         (self.moved_m / SPECKLE_LENGTH_M).floor() as i64
     }
 
-    /// The bench as it stands now: the target bowed, and moved along the optical axis.
+    /// The bench at this moment: the target bowed, and moved along the optical axis.
     pub fn bench(&self, causes: &Causes, at_rest: &Bench) -> Bench {
         let by = Vector3::z() * self.moved_m;
         let normal = at_rest.plane.normal();

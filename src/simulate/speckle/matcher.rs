@@ -1,7 +1,7 @@
-//! Block matching: which shift of the reference looks most like the picture.
+//! Block matching: finds the shift of the reference most similar to the picture.
 //!
-//! Normalised cross-correlation (zero mean) over a square window, every candidate tried for every
-//! pixel, parabola through the best three.
+//! Zero-mean normalised cross-correlation over a square window, every candidate tried for every pixel,
+//! parabola through the best three.
 
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ pub struct Match {
     pub correlation: Vec<f32>,
 }
 
-/// Rows a task works on; its first window costs it `2 half` rows more.
+/// Rows per task; its first window takes `2 half` rows more.
 const BAND: usize = 96;
 
 pub fn find(picture: &Frame, reference: &Reference) -> Match {
@@ -48,7 +48,7 @@ fn match_band(
     };
     let first = top.max(half);
     let end = (top + shift.len() / image.width).min(image.height.saturating_sub(half));
-    // A picture smaller than the window has no answer.
+    // A picture smaller than the window has no match.
     if first >= end || image.width <= 2 * half {
         return;
     }
@@ -98,7 +98,7 @@ fn match_row(
     }
 }
 
-/// Of the parabola through three equidistant values, the middle one the largest; in steps.
+/// Vertex of the parabola through three equidistant values, the middle one the largest; in steps from it.
 fn vertex(left: f32, middle: f32, right: f32) -> f32 {
     let curvature = left - 2.0 * middle + right;
     if curvature < 0.0 { 0.5 * (left - right) / curvature } else { 0.0 }

@@ -1,15 +1,15 @@
-//! A Kinect that sees dots and matches them; no error formula anywhere.
+//! A Kinect simulated by its dots and matcher, without any error formula.
 //!
 //! ```text
 //! pattern -> optics -> image -> matcher -> read-out -> 11-bit raw values
 //!            (world)            (reference)
 //! ```
-//! Frames: the camera's optical frame (x right, y down, z forward, m). The projector stands at
-//! (+baseline, 0, 0), turned as the camera: as on a Kinect v1, on the camera's right when looking
-//! out, so that the shadow of a thing falls on its left. A point at depth z is seen
-//! d = fx * baseline / z px to the right of where the projector sends its dot.
+//! Frames: the camera's optical frame (x right, y down, z forward, m). The projector stands at (+baseline,
+//! 0, 0) with the camera's orientation: as on a Kinect v1, to the camera's right when looking out, so that
+//! an object's shadow falls on its left. A point at depth z is seen d = fx * baseline / z px to the right
+//! of where the projector sends its dot.
 //!
-//! What can be set are [`Causes`]; noise, steps, bias, holes and shadows follow.
+//! Only [`Causes`] can be set; noise, steps, bias, holes and shadows follow.
 
 mod causes;
 mod matcher;
@@ -34,11 +34,11 @@ use crate::sensors::KINECT_BASELINE_M;
 use crate::stats::range;
 use crate::view::Sensor;
 
-/// A structured-light sensor without any formula of its errors.
+/// A structured-light sensor without any error formula.
 pub struct SpeckleSensor {
-    /// As its recordings describe it: without the lens it does not know of.
+    /// The sensor as its recordings describe it: without the unknown lens distortion.
     described: Sensor,
-    /// As it is.
+    /// The true camera.
     camera: Camera,
     baseline_m: f64,
     causes: Causes,
@@ -54,7 +54,7 @@ pub struct SpeckleShot {
 }
 
 impl SpeckleSensor {
-    /// With the camera and baseline of `sensor` (0.075 m where it has none).
+    /// A sensor with the camera and baseline of `sensor` (0.075 m where it has none).
     pub fn new(sensor: &Sensor, causes: Causes) -> Self {
         let baseline_m = sensor.baseline_m.unwrap_or(KINECT_BASELINE_M);
         let camera = with_unknown_lens(&sensor.camera, &causes);
@@ -74,13 +74,13 @@ impl SpeckleSensor {
         &self.described
     }
 
-    /// Point it at `bench` for one view.
+    /// Points it at `bench` for one view.
     pub fn begin<'a>(&'a self, bench: &'a Bench, seed: Seed) -> Filming<'a> {
         Filming { sensor: self, bench, seed, lit: None }
     }
 
-    /// One frame of a world that stands otherwise in every frame. `instant` tells how warm the
-    /// sensor is, and the frame's own noise and speckle.
+    /// Takes one frame of a world that differs from frame to frame. `instant` determines the sensor's
+    /// temperature, and the frame's own noise and speckle.
     pub fn shoot(&self, world: &dyn World, instant: &Instant, seed: Seed) -> SpeckleShot {
         let moment = Moment { moved_m: 0.0, ..Moment::of(&self.causes, instant) };
         let frame = instant.frame;
@@ -102,7 +102,7 @@ impl SpeckleSensor {
         SpeckleShot { depth: self.read_out(&infrared), infrared }
     }
 
-    /// Light that is there without the projector, DN; `None` in the dark.
+    /// Ambient light, without the projector, DN; `None` in the dark.
     fn ambient(&self, world: &dyn World) -> Option<Vec<f32>> {
         if self.causes.ambient_dn == 0.0 {
             return None;
@@ -117,7 +117,7 @@ impl SpeckleSensor {
         Some((0..self.camera.pixels()).map(light).collect())
     }
 
-    /// What the matcher finds in an infrared picture, as raw values.
+    /// Raw values that the matcher finds in an infrared picture.
     fn read_out(&self, infrared: &Frame) -> Frame {
         let found = matcher::find(infrared, &self.reference);
         let confidence = self.causes.confidence as f32;
@@ -137,7 +137,7 @@ pub struct Filming<'a> {
     sensor: &'a SpeckleSensor,
     bench: &'a Bench,
     seed: Seed,
-    /// Light without noise, good as long as nothing moves or warms.
+    /// Light without noise, valid as long as nothing moves or warms up.
     lit: Option<Lit>,
 }
 
@@ -170,7 +170,7 @@ impl Filming<'_> {
     }
 }
 
-/// The sensor's own lens, and what is wrong with it on top.
+/// The sensor's own lens with the unknown distortion added.
 fn with_unknown_lens(camera: &Camera, causes: &Causes) -> Camera {
     let [k1, k2, p1, p2, k3] = camera.distortion.unwrap_or_default();
     let bent = [k1 + causes.lens_k1, k2 + causes.lens_k2, p1, p2, k3];
@@ -178,9 +178,9 @@ fn with_unknown_lens(camera: &Camera, causes: &Causes) -> Camera {
     Camera { distortion: if unknown { Some(bent) } else { camera.distortion }, ..camera.clone() }
 }
 
-/// Dots wherever picture or reference can see one.
+/// Dots wherever the picture or the reference can see one.
 fn pattern_for(camera: &Camera, baseline_m: f64, candidates: Candidates) -> Pattern {
-    /// Blur, drift of the wavelength and the width of dots stay inside, px.
+    /// Margin for blur, wavelength drift and the width of dots, px.
     const MARGIN_PX: f64 = 16.0;
     let (right, bottom) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);
     let rim = (0..=8).map(|i| f64::from(i) / 8.0).flat_map(|share| {
@@ -190,13 +190,13 @@ fn pattern_for(camera: &Camera, baseline_m: f64, candidates: Candidates) -> Patt
     let [x0, x1] = range(rim.clone().map(|(x, _)| x));
     let [y0, y1] = range(rim.map(|(_, y)| y));
     let (mx, my) = (MARGIN_PX / camera.fx, MARGIN_PX / camera.fy);
-    // The projector's x is the camera's less the disparity: least for the nearest surface.
+    // The projector's x is the camera's minus the disparity: smallest for the nearest surface.
     let nearest = candidates.last() as f64 / camera.fx + baseline_m / REFERENCE_M;
     let field = Field { x: [x0 - nearest - mx, x1 + mx], y: [y0 - my, y1 + my] };
     Pattern::over(&field, camera.fx)
 }
 
-/// The factory: a white plane across the axis, cold, no speckle, no noise.
+/// Records the factory reference: a white plane perpendicular to the axis, cold, no speckle, no noise.
 fn record_reference(
     camera: &Camera,
     baseline_m: f64,
@@ -207,7 +207,7 @@ fn record_reference(
     let plane = Bench::bare(Plane::tilted(REFERENCE_M, 0.0, 0.0), Target::Wall);
     let optics = Optics { light: 1.0, ..Optics::at(&Moment::FACTORY, causes, camera, baseline_m) };
     let even = vec![Grain::NONE; pattern.dots.len()];
-    // It answers to all columns of a picture.
+    // Wide enough for all candidates of all columns of a picture.
     let columns = camera.width + candidates.count - 1;
     let dark = Picture::dark(columns, camera.height, -candidates.last());
     dark.with(&optics.spots(&plane, pattern, &even))

@@ -1,5 +1,5 @@
-//! From the projector to the surface and into the lens: where every dot lands in the picture, and the
-//! 10-bit numbers of the infrared camera.
+//! From the projector via the surface into the lens: the image position of every dot, and the 10-bit
+//! numbers of the infrared camera.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -16,37 +16,37 @@ pub struct Spot {
     /// Centre, px.
     pub u: f64,
     pub v: f64,
-    /// Brightest value, DN.
+    /// Peak value, DN.
     pub peak: f64,
     /// Covariance, px^2.
     pub covariance: Matrix2<f64>,
 }
 
-/// Projector and camera as they stand at one moment.
+/// Projector and camera at one moment.
 pub struct Optics<'a> {
     /// The true lens, distortion included.
     pub camera: &'a Camera,
-    /// Of the projector in the camera's frame, m.
+    /// Position of the projector in the camera's frame, m.
     pub projector: Vector3<f64>,
-    /// Sines of the diffracted beams over those at the factory: proportional to the wavelength.
+    /// Sines of the diffracted beams relative to those at the factory: proportional to the wavelength.
     pub pattern_scale: f64,
     pub blur_px: f64,
     /// Relative projector power.
     pub light: f64,
 }
 
-/// Landau, Choo and Beling 2015: 5.90e8 cos / r^2 DN (r in mm), 10 bits, is a dot's mean peak.
+/// Mean peak of a dot: 5.90e8 cos / r^2 DN (r in mm), 10 bits (Landau, Choo and Beling 2015).
 const PEAK_DN_AT_1_M: f64 = 590.0;
-/// Their Gamma factor has the mean 4.54 * 0.196 and not one.
+/// Their Gamma factor has mean 4.54 * 0.196, not one.
 const LANDAU_MEAN: f64 = 4.54 * 0.196;
-/// Beam of a dot, sd in camera px: with blur and pixel 0.63 px, FWHM 1.5 px, as infrared pictures
-/// of a Kinect show them (1 to 2 px).
+/// Standard deviation of a dot's beam, camera px: with blur and pixel 0.63 px, FWHM 1.5 px, as in infrared
+/// pictures of a Kinect (1 to 2 px).
 const BEAM_PX: f64 = 0.4;
-/// A square pixel of side one averages: variance of a uniform variable.
+/// Averaging over a square pixel of side one: variance of a uniform variable, px^2.
 const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
-/// Lens sharpness at which Landau's peak is met, px.
+/// Lens blur at which Landau's peak holds, px.
 const LANDAU_BLUR_PX: f64 = 0.4;
-/// A surface that hides a point is nearer by more than this share of the way.
+/// A surface that hides a point is nearer by more than this share of the distance.
 const HIDING_SHARE: f64 = 1e-3;
 
 impl<'a> Optics<'a> {
@@ -61,14 +61,14 @@ impl<'a> Optics<'a> {
         }
     }
 
-    /// The pattern on the world, with the speckle of each dot.
+    /// Projects the pattern onto the world, with the speckle of each dot.
     pub fn spots(&self, world: &dyn World, pattern: &Pattern, grains: &[Grain]) -> Vec<Spot> {
         let eyes = [world.from(self.projector), world.from(Vector3::zeros())];
         let lit = pattern.dots.iter().zip(grains);
         lit.filter_map(|(dot, grain)| self.spot(&eyes, dot, grain)).collect()
     }
 
-    /// `eyes` are the projector's and the camera's.
+    /// `eyes` cast rays from the projector and from the camera.
     fn spot(&self, eyes: &[RaysFrom<'_>; 2], dot: &Dot, grain: &Grain) -> Option<Spot> {
         let [projector, camera] = eyes;
         let beam = self.beam(dot)?;
@@ -86,7 +86,7 @@ impl<'a> Optics<'a> {
         let covariance = image + Matrix2::identity() * smear(self.blur_px);
         let irradiance =
             -hit.normal.dot(&beam) / beam.norm() / (hit.t * hit.t * beam.norm_squared());
-        // cos^4 of the angle to the axis: less aperture, longer way, slanted pixel.
+        // cos^4 of the angle to the axis: smaller aperture, longer path, slanted pixel.
         let vignetting = (1.0 + x * x + y * y).powi(-2);
         let brightness = irradiance * vignetting * hit.albedo / WHITE * dot.energy * grain.light;
         let spread = (image.determinant() / covariance.determinant()).sqrt();
@@ -94,7 +94,7 @@ impl<'a> Optics<'a> {
         Some(Spot { u: u + aside.x, v: v + aside.y, peak, covariance })
     }
 
-    /// Diffraction fixes sines, not tangents: they grow with the wavelength.
+    /// Ray of a dot. Diffraction fixes sines, not tangents: they grow with the wavelength.
     fn beam(&self, dot: &Dot) -> Option<Vector3<f64>> {
         let sines = Vector3::new(dot.x, dot.y, 1.0).normalize() * self.pattern_scale;
         let forward = 1.0 - sines.x * sines.x - sines.y * sines.y;
@@ -102,7 +102,8 @@ impl<'a> Optics<'a> {
         (forward > 0.0).then(|| Vector3::new(tangent(sines.x), tangent(sines.y), 1.0))
     }
 
-    /// Jacobian of picture coordinates (px) by pattern coordinates, on the surface that was hit.
+    /// Jacobian of picture coordinates (px) with respect to pattern coordinates, on the surface that was
+    /// hit.
     ///
     /// On a plane 1/z is affine in the pattern's coordinates, and x_camera = x + baseline / z:
     /// a tilt along the baseline stretches the pattern, one across it shears it.
@@ -118,23 +119,23 @@ fn smear(blur_px: f64) -> f64 {
     blur_px * blur_px + PIXEL_VARIANCE
 }
 
-/// Peak of an unblurred mean dot on white at 1 m, DN, so that the blurred one has Landau's.
+/// Peak of an unblurred mean dot on white at 1 m, DN, such that the blurred dot has Landau's peak.
 fn full_light() -> f64 {
     let beam = BEAM_PX * BEAM_PX;
     PEAK_DN_AT_1_M * LANDAU_MEAN * (beam + smear(LANDAU_BLUR_PX)) / beam
 }
 
-/// Is the lit side turned to the camera, with nothing in between?
+/// Whether the lit side faces the camera, with nothing in between.
 fn seen_from_camera(camera: &RaysFrom<'_>, point: &Vector3<f64>, hit: &Hit) -> bool {
     hit.normal.dot(point) < 0.0 && camera(point).is_none_or(|first| first.t > 1.0 - HIDING_SHARE)
 }
 
-/// Pixels by normalised coordinates at (x, y).
+/// Jacobian of pixel coordinates with respect to normalised coordinates at (x, y).
 fn lens_jacobian(camera: &Camera, (x, y): (f64, f64)) -> Matrix2<f64> {
     if camera.distortion.is_none() {
         return Matrix2::new(camera.fx, 0.0, 0.0, camera.fy);
     }
-    // The lens bends over tenths; a thousandth is short against that and long against rounding.
+    // Distortion varies over tenths; a thousandth is short against that and long against rounding.
     const H: f64 = 1e-3;
     let column = |dx: f64, dy: f64| {
         let (u1, v1) = camera.project(x + dx, y + dy);
@@ -149,14 +150,14 @@ fn lens_jacobian(camera: &Camera, (x, y): (f64, f64)) -> Matrix2<f64> {
 pub struct Picture {
     pub width: usize,
     pub height: usize,
-    /// Column of the camera's image that is the first of this picture, px.
+    /// Column of the camera's image at which this picture begins, px.
     pub first_column: i64,
     pub dn: Vec<f32>,
 }
 
-/// A Gaussian ends where it has fallen to 1/500: below the noise of any single pixel.
+/// A Gaussian is cut off where it has fallen to 1/500: below the noise of any single pixel.
 const REACH_SIGMA: f64 = 3.5;
-/// At grazing incidence a dot becomes a streak; what is longer is spread too thin to be seen, px.
+/// Longest dot, px: at grazing incidence a dot becomes a streak, and a longer one is too faint to be seen.
 const LONGEST_PX: f64 = 20.0;
 
 impl Picture {
@@ -195,14 +196,14 @@ fn covered(centre: f64, reach: f64, size: usize) -> std::ops::Range<usize> {
     if low <= high { low as usize..high as usize + 1 } else { 0..0 }
 }
 
-/// A 10-bit sensor of this class fills up at some 10,000 electrons.
+/// A 10-bit sensor of this class has a full well of some 10,000 electrons.
 const ELECTRONS_PER_DN: f32 = 10.0;
 const FULL_DN: f32 = 1023.0;
-/// Black is lifted by four read noises, so that 10 bits without a sign cut nothing off.
+/// Black level: four times the usual read noise, so that unsigned 10 bits clip nothing.
 const BLACK_DN: f32 = 42.0;
 
-/// One exposure of the chip, with shot and read noise. `ambient` is the light that is there without
-/// the projector, DN, row-major.
+/// Exposes the chip once, with shot and read noise. `ambient` is the light without the projector, DN,
+/// row-major.
 pub fn expose(
     picture: &Picture,
     ambient: Option<&[f32]>,
@@ -224,7 +225,7 @@ pub fn expose(
 mod tests {
     use super::*;
 
-    /// Centroid, total and slant of a spot against its own numbers.
+    /// Centroid, total and covariance of a drawn spot against its parameters.
     #[test]
     fn a_spot_keeps_its_place_light_and_slant() {
         let covariance = Matrix2::new(1.2, 0.4, 0.4, 0.7);

@@ -1,4 +1,4 @@
-//! The dots a projector sends out, fixed for the life of the unit, and their laser speckle.
+//! The dot pattern of a projector, fixed for the life of the unit, and its laser speckle.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -19,15 +19,15 @@ pub struct Pattern {
     pub dots: Vec<Dot>,
 }
 
-/// The pattern is the unit's own, whatever the seed of a simulation.
+/// Seed of the pattern, which belongs to the unit and does not depend on the simulation's seed.
 const UNIT: Seed = Seed(0x4b69_6e65_6374);
 /// Three tiles of 211 places span 640 columns (Reichinger, "Kinect Pattern Uncovered", by memory).
 const PITCH_PX: f64 = 640.0 / 633.0;
-/// Places that hold a dot: about one in nine, a 9 x 9 window sees nine (same source).
+/// Share of places that hold a dot: about one in nine, nine in a 9 x 9 window (same source).
 const FILLED: f64 = 0.11;
-/// The light of a dot in a picture is Gamma-distributed with shape 4.54 (Landau, Choo and Beling
-/// 2015): the projector's unevenness times speckle. Given half each, both have the shape s of
-/// (1 + 1/s)^2 = 1 + 1/4.54, s = 9.55.
+/// The light of a dot in a picture is Gamma-distributed with shape 4.54 (Landau, Choo and Beling 2015):
+/// uneven dot power times speckle. Split evenly, both have shape s with (1 + 1/s)^2 = 1 + 1/4.54, so s =
+/// 9.55.
 const ENERGY_SHAPE: f64 = 9.55;
 
 /// A rectangle of normalised projector coordinates.
@@ -38,7 +38,7 @@ pub struct Field {
 }
 
 impl Pattern {
-    /// Dots over `field`, made for a camera of this focal length, px.
+    /// Dots over `field` for a camera of this focal length, px.
     pub fn over(field: &Field, focal_px: f64) -> Self {
         let pitch = PITCH_PX / focal_px;
         let places = |[low, high]: [f64; 2]| ((high - low) / pitch).ceil() as usize + 1;
@@ -46,8 +46,8 @@ impl Pattern {
         let energy = Gamma::new(ENERGY_SHAPE, 1.0 / ENERGY_SHAPE);
         let mut rng = UNIT.stream("simulate/speckle/energy");
         let mut aside = UNIT.stream("simulate/speckle/aside");
-        // Anywhere in its place: on a strict grid of nearly a pixel's pitch all dots of a column
-        // would meet the pixels alike, and the beat would paint stripes of 90 px.
+        // Jittered within its place: on a strict grid of nearly a pixel's pitch all dots of a column would
+        // have the same sub-pixel phase, and the beat would show as stripes of 90 px.
         let mut within = |place: usize| pitch * (place as f64 + aside.random_range(-0.5..0.5));
         let dot = |place: usize| Dot {
             x: field.x[0] + within(place % columns),
@@ -58,12 +58,12 @@ impl Pattern {
     }
 }
 
-/// Random places without neighbours, so that every dot is seen by itself: fill in random order
-/// what is still free (jams at a density of 0.19, far above [`FILLED`]).
+/// Random places without neighbours, so that every dot stands alone: random sequential filling of free
+/// places (jams at a density of 0.19, far above [`FILLED`]).
 fn free_places(columns: usize, rows: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..columns * rows).collect();
     order.shuffle(&mut UNIT.stream("simulate/speckle/places"));
-    // A margin of one spares the edges a special case.
+    // A margin of one avoids a special case at the edges.
     let stride = columns + 2;
     let mut blocked = vec![false; stride * (rows + 2)];
     let wanted = (FILLED * (columns * rows) as f64) as usize;
@@ -80,20 +80,19 @@ fn free_places(columns: usize, rows: usize) -> Vec<usize> {
             }
         }
     }
-    // In reading order: memory is walked forward when the dots are drawn.
+    // Row-major, so that drawing the dots walks memory forward.
     chosen.sort_unstable();
     chosen
 }
 
-/// What laser speckle makes of one dot: on a rough surface it is a handful of bright grains.
+/// Effect of laser speckle on one dot: on a rough surface it is a handful of bright grains.
 ///
-/// Grains are placed by the roughness, so they stand still while the scene does. With M grains a
-/// dot's light has the contrast 1 / sqrt(M), and its centre of light lies off by 1 / sqrt(M) of its
-/// radius: the limit of every triangulation with coherent light (Dorsch, Haeusler and Herrmann
-/// 1994, from memory).
+/// The surface roughness places the grains, so they are static while the scene is. With M grains a dot's
+/// light has the contrast 1 / sqrt(M), and its centroid is off by 1 / sqrt(M) of its radius: the limit of
+/// every triangulation with coherent light (Dorsch, Haeusler and Herrmann 1994, from memory).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grain {
-    /// Light over that of the smooth dot.
+    /// Light relative to that of the smooth dot.
     pub light: f64,
     /// Shift of its centre along the pattern's x and y, in standard deviations of the beam.
     pub aside: [f64; 2],
@@ -102,9 +101,9 @@ pub struct Grain {
 impl Grain {
     pub const NONE: Grain = Grain { light: 1.0, aside: [0.0; 2] };
 
-    /// Of `count` dots, in their order; `contrast` is sd over mean of a dot's light.
+    /// Draws the grains of `count` dots, in order; `contrast` is sd over mean of a dot's light.
     pub fn draw(count: usize, contrast: f64, rng: &mut Stream) -> Vec<Grain> {
-        // There is no such distribution without contrast.
+        // Zero contrast has no Gamma distribution.
         let Ok(gamma) = Gamma::new(contrast.powi(-2), contrast * contrast) else {
             return vec![Grain::NONE; count];
         };
@@ -122,7 +121,7 @@ impl Grain {
 mod tests {
     use super::*;
 
-    /// Count, spacing and energies against what is said of the real one.
+    /// Count, spacing and energies against what is published of the real pattern.
     #[test]
     fn the_pattern_is_as_dense_as_a_kinects_and_its_dots_stand_apart() {
         let field = Field { x: [-0.55, 0.55], y: [-0.41, 0.41] };
@@ -135,7 +134,7 @@ mod tests {
             assert_eq!(dots.iter().filter(near).count(), 1, "dot {i}");
         }
         let mean = dots.iter().map(|d| d.energy).sum::<f64>() / dots.len() as f64;
-        // Standard error 0.32 / sqrt(24000) = 0.002: seven of them.
+        // Standard error 0.32 / sqrt(24000) = 0.002: the tolerance is seven of them.
         assert!((mean - 1.0).abs() < 0.015, "{mean}");
     }
 }

@@ -1,18 +1,18 @@
-//! What the matcher compares with, the pattern on a plane as recorded at the factory: its sums over the
-//! matching window, and how shifts against it become 11-bit raw values.
+//! The matcher's reference, the pattern on a plane as recorded at the factory: its sums over the matching
+//! window, and the conversion of shifts against it to 11-bit raw values.
 
 use super::optics::Picture;
 use crate::frame::{DepthCode, KINECT_NO_MEASUREMENT};
 use crate::stats::SummedArea;
 
-/// Distance of the factory's plane, m. The real one is not published; at 2 m the picture moves by
-/// +22 px at 1 m and by -11 px at 4 m.
+/// Distance of the factory's plane, m. The real one is not published; from 2 m the pattern shifts by +22 px
+/// at 1 m and by -11 px at 4 m.
 pub const REFERENCE_M: f64 = 2.0;
-/// The matcher looks between these depths, m (near mode begins at 0.4 m; at 8 m a step is 0.2 m).
+/// Depth range of the matcher, m (near mode begins at 0.4 m; at 8 m a step is 0.2 m).
 const NEAREST_M: f64 = 0.4;
 const FARTHEST_M: f64 = 8.0;
 
-/// Shifts against the reference that are tried, px.
+/// Candidate shifts against the reference, px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidates {
     pub first: i64,
@@ -20,7 +20,7 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// All from the farthest to the nearest depth for this fx * baseline, px m.
+    /// All shifts from the farthest to the nearest depth for this fx * baseline, px m.
     pub fn of(disparity_px_m: f64) -> Self {
         let shift = |z: f64| disparity_px_m * (1.0 / z - 1.0 / REFERENCE_M);
         // One more on either side, for the parabola.
@@ -40,7 +40,7 @@ pub struct Reference {
     pub half_window: usize,
     pub image: WindowedImage,
     pub mean: Vec<f32>,
-    /// One over the contrast; zero where nothing is to be seen.
+    /// Reciprocal of the contrast; zero where that is zero.
     pub weight: Vec<f32>,
 }
 
@@ -63,12 +63,12 @@ impl Reference {
 /// The raw value of infinity on a Kinect v1 (Fisher's 3.331 / 0.003071, OpenKinect).
 const RAW_AT_INFINITY: f64 = 1084.6;
 
-/// What a Kinect v1 reads out, px: one raw value a step.
+/// Read-out step of a Kinect v1, px: one raw value per step.
 const USUAL_STEP_PX: f64 = 0.125;
 
-/// How a shift becomes a raw value, and a raw value a depth.
+/// Conversion of shifts to raw values, and of raw values to depths.
 pub struct ReadOut {
-    /// Where the matcher answers in coarser steps than its raw values have, px.
+    /// Step of the matcher, px, where it is coarser than that of the raw values.
     coarse_px: Option<f64>,
     /// fx * baseline, px m.
     disparity_px_m: f64,
@@ -77,8 +77,8 @@ pub struct ReadOut {
 }
 
 impl ReadOut {
-    /// `nearest_px` is the largest shift there is. A recorder's own disparity code is kept, so
-    /// that its description does not betray the step.
+    /// `nearest_px` is the largest possible shift. A recorder's own disparity code is kept, so that its
+    /// description does not betray the step.
     pub fn new(step_px: f64, disparity_px_m: f64, nearest_px: f64, own: &DepthCode) -> Self {
         let raw_px = step_px.min(USUAL_STEP_PX);
         let usual = RAW_AT_INFINITY - disparity_px_m / REFERENCE_M / raw_px;
@@ -110,13 +110,13 @@ impl ReadOut {
     }
 }
 
-/// A picture with the sums over the window about each pixel, row-major; zero where it does not fit.
+/// A picture with the sums over the window about each pixel, row-major; zero where the window does not fit.
 pub struct WindowedImage {
     pub width: usize,
     pub height: usize,
     pub grey: Vec<f32>,
     pub sum: Vec<f32>,
-    /// Root of the summed squares about the window's mean; zero where nothing is to be seen.
+    /// Root of the sum of squared deviations from the window's mean; zero in a uniform window.
     pub contrast: Vec<f32>,
 }
 
@@ -146,14 +146,14 @@ impl WindowedImage {
     }
 }
 
-/// Candidates are worked on in groups of this size: a multiple of any vector register.
+/// Candidates are processed in groups of this size: a multiple of any vector register.
 pub const LANES: usize = 8;
 
-/// For every column u and candidate k the products picture(u) * reference(u, k), summed over the
-/// rows of the window; k runs fastest, so that every loop below is a plain vector loop.
+/// For every column u and candidate k the products picture(u) * reference(u, k), summed over the rows of
+/// the window; k varies fastest, so that every loop below vectorises.
 ///
-/// Picture and reference hold whole numbers of 10 and 8 bits: 31 rows stay below 2^24, so that
-/// single precision is exact and adding and taking away leaves no trace.
+/// Picture and reference hold integers of 10 and 8 bits: sums over 31 rows stay below 2^24, so single
+/// precision is exact, and adding and subtracting rows accumulates no error.
 pub struct ColumnProducts {
     width: usize,
     candidates: usize,
@@ -200,12 +200,12 @@ impl ColumnProducts {
     }
 }
 
-/// The largest value and its first place.
+/// Index of the largest value (the first of them), and the value.
 pub fn best(scores: &[f32]) -> (usize, f32) {
     let mut lanes = [f32::NEG_INFINITY; LANES];
     for group in scores.chunks_exact(LANES) {
         for (top, &s) in lanes.iter_mut().zip(group) {
-            // Not f32::max, whose care for NaN costs a branch a lane.
+            // Not f32::max, whose NaN handling costs a branch per lane.
             *top = if s > *top { s } else { *top };
         }
     }
@@ -218,7 +218,7 @@ pub fn best(scores: &[f32]) -> (usize, f32) {
 mod tests {
     use super::*;
 
-    /// Against triangulation, written down again.
+    /// Against an independent implementation of triangulation.
     #[test]
     fn raw_values_and_depths_agree_with_triangulation() {
         let metric = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
@@ -233,7 +233,7 @@ mod tests {
         assert!((offset / -slope - 1084.6).abs() < 1.0, "infinity is where a Kinect has it");
     }
 
-    /// The description is the recorder's own, or the usual one, whatever the step.
+    /// The description is the recorder's own, or the usual one, for usual and coarse steps alike.
     #[test]
     fn the_code_does_not_betray_the_step() {
         let metric = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
