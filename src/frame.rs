@@ -78,7 +78,9 @@ impl DepthCode {
                 (z * units_per_metre, invalid, 65535.0)
             }
             DepthCode::Disparity { offset, slope, invalid } => {
-                ((1.0 / z - offset) / slope, invalid, f64::from(KINECT_NO_MEASUREMENT))
+                // A Kinect's words have 11 bits, and the last of them is no measurement.
+                let top = if invalid == KINECT_NO_MEASUREMENT { invalid } else { u16::MAX };
+                ((1.0 / z - offset) / slope, invalid, f64::from(top))
             }
         };
         let rounded = exact.round();

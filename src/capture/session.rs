@@ -134,7 +134,8 @@ impl Session {
         }
         self.partial = None;
         if replaced {
-            fs::remove_dir_all(&old).map_err(|e| failed(&old, e))?;
+            // The new view is in its place: what is left of the old one goes with the next session's leftovers.
+            let _ = fs::remove_dir_all(&old);
         }
         sync(&self.root)
     }

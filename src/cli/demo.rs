@@ -163,6 +163,8 @@ fn diagnosed(
 
 /// Frames of the film: two seconds.
 const FRAMES: usize = 60;
+/// Every run maps the same office, which is filmed once.
+const OFFICE: Seed = Seed(1);
 
 /// Films an office through the same sensor and maps it without the model and with it.
 fn mapped(
@@ -171,9 +173,8 @@ fn mapped(
     output: &Path,
     global: &Global,
 ) -> anyhow::Result<()> {
-    let seed = global.seed();
+    let seed = OFFICE;
     say("\n3. Map: an office, filmed through the calibrated sensor.\n");
-    // The same seed makes the same film: an existing one is reused.
     let folder = output.join(format!("office-{}", seed.0));
     if !folder.join("groundtruth.txt").is_file() {
         let film = Film {

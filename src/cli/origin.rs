@@ -8,7 +8,7 @@ use super::common::source_date;
 use super::console::quoted;
 
 /// Flags without influence on the results.
-const FLAGS: [&str; 5] = ["--json", "--force", "--exit-zero", "-q", "-v"];
+const FLAGS: [&str; 7] = ["--json", "--force", "--exit-zero", "-q", "--quiet", "-v", "--verbose"];
 
 /// Origin of a page made from `recording` now (or at SOURCE_DATE_EPOCH).
 pub fn origin(recording: &Path, seed: u64) -> Origin {

@@ -54,7 +54,7 @@ impl Correction {
 
     fn known<'a>(&'a self, depth_m: &[f32], conditions: &'a Conditions) -> Known<'a> {
         let factor = self.factor(conditions);
-        let slopes = self.needs.slope.then(|| self.slopes(depth_m, factor));
+        let slopes = self.needs.slope.then(|| self.stored_slopes(depth_m, factor));
         let terms = self.terms.iter().filter(|(t, _)| conditions.determine(t)).collect();
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
         let columns = self.columns(depth_m, factor);
@@ -99,9 +99,15 @@ impl Correction {
 
     /// Standard uncertainty of the corrected depths `depth_m` from the learnt shapes, m; NaN where there is
     /// no depth. Errors that planes cannot show are not included.
-    pub fn uncertainty_m(&self, depth_m: &[f32], conditions: &Conditions) -> Vec<f32> {
+    /// Fails if the image does not have the sensor's size.
+    pub fn uncertainty_m(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f32>> {
+        self.refuse_size(depth_m)?;
         let pixels = Pixels::new(&self.camera, &self.rays, self.scale_px_m);
-        let slopes = self.uncertainty.needs.slope.then(|| self.slopes(depth_m, 1.0));
+        let slopes = self
+            .uncertainty
+            .needs
+            .slope
+            .then(|| self.slopes(depth_m, |_, z| self.scale_px_m / f64::from(z)));
         let tilt = self.uncertainty.needs.tilt;
         let (terms, columns) = (Vec::new(), Vec::new());
         let known = Known { conditions, factor: 1.0, slopes, pixels, terms, columns, tilt };
@@ -115,7 +121,7 @@ impl Correction {
             let px = self.uncertainty.variance(&place, parts).sqrt();
             (px * z * z / self.scale_px_m) as f32
         };
-        depth_m.par_iter().enumerate().map_init(Vec::new, sigma).collect()
+        Ok(depth_m.par_iter().enumerate().map_init(Vec::new, sigma).collect())
     }
 
     /// Predicted standard deviation of each stored depth, m: sigma at the corrected depth and the surface's
@@ -125,7 +131,7 @@ impl Correction {
         self.refuse_size(depth_m)?;
         let mut known = self.known(depth_m, conditions);
         let slopes = known.slopes.take();
-        known.slopes = slopes.or_else(|| Some(self.slopes(depth_m, known.factor)));
+        known.slopes = slopes.or_else(|| Some(self.stored_slopes(depth_m, known.factor)));
         known.tilt = true;
         let variance = || self.variance.iter().filter(|(t, _)| conditions.determine(t));
         let sigma = |(i, &z): (usize, &f32)| {
@@ -159,9 +165,15 @@ impl Correction {
             .map_or_else(Vec::new, |steps| (0..width).map(|u| steps.error_px(u)).collect())
     }
 
-    fn slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
+    /// Slopes of the surfaces in an image of stored depths.
+    fn stored_slopes(&self, depth_m: &[f32], factor: f64) -> Slopes {
+        self.slopes(depth_m, |i, z| self.disparity(i, z, factor))
+    }
+
+    /// Slopes of the image's surfaces; `disparity` is that of a pixel with this depth, px.
+    fn slopes(&self, depth_m: &[f32], disparity: impl Fn(usize, f32) -> f64 + Sync) -> Slopes {
         let disparity = |i: usize| match depth_m[i] {
-            z if z > 0.0 => self.disparity(i, z, factor),
+            z if z > 0.0 => disparity(i, z),
             _ => f64::NAN,
         };
         Slopes::of(self.camera.width, self.camera.height, disparity, &self.noise)

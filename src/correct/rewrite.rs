@@ -220,7 +220,7 @@ impl Rewrite<'_> {
     }
 
     fn write_sigma(&self, target: &Path, depth_m: &[f32], image: &Image) -> Result<()> {
-        let sigma = self.correction.uncertainty_m(depth_m, &image.conditions);
+        let sigma = self.correction.uncertainty_m(depth_m, &image.conditions)?;
         let word = |s: &f32| match f64::from(*s) * SIGMA_UNITS_PER_METRE {
             units if units.is_nan() => 0,
             // Zero uncertainty must not read as a missing depth.
@@ -238,7 +238,8 @@ impl Rewrite<'_> {
         let none = self.raw.code.raw(f64::NAN);
         // Half a px beyond the range still counts as inside.
         let beyond = self.correction.learnt_px().map(|[low, high]| {
-            [self.correction.scale_px_m / (high + 0.5), self.correction.scale_px_m / (low - 0.5)]
+            let far_px = (low - 0.5).max(0.0);
+            [self.correction.scale_px_m / (high + 0.5), self.correction.scale_px_m / far_px]
         });
         for (raw, (&z, &better)) in frame.raw.iter_mut().zip(before.iter().zip(after)) {
             let old = *raw;
@@ -247,7 +248,7 @@ impl Rewrite<'_> {
                 continue;
             }
             tally.measured += 1;
-            let learnt = |[near, far]: [f64; 2]| far < 0.0 || (near..=far).contains(&f64::from(z));
+            let learnt = |[near, far]: [f64; 2]| (near..=far).contains(&f64::from(z));
             tally.beyond += usize::from(beyond.is_some_and(|ends| !learnt(ends)));
             if z == better && !self.recodes() {
                 continue;

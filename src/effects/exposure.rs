@@ -22,6 +22,18 @@ pub struct Instant {
     pub view_s: f64,
 }
 
+/// Values of an effect, by its id, that depend on what is seen alone.
+pub type Still = HashMap<(&'static str, Kept), Vec<f32>>;
+
+/// Which values these are: a model may hold the shape of an effect beside the effect itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kept {
+    /// Made by the effect ([`Exposure::with_kept`]).
+    Made,
+    /// Of a learnt shape at rest.
+    Shape,
+}
+
 /// A frame in progress. Arrays are per pixel, row-major; NaN means no value.
 pub struct Exposure<'a> {
     pub sensor: &'a Sensor,
@@ -45,8 +57,8 @@ pub struct Exposure<'a> {
     pub disparity: Vec<f32>,
     /// State that an effect keeps from frame to frame of a view, by its id; frames come in order.
     pub memory: HashMap<&'static str, Vec<f32>>,
-    /// Values that an effect derived from `seen` alone, by its id; dropped when something else is seen.
-    pub still: HashMap<&'static str, Vec<f32>>,
+    /// Values that an effect derived from `seen` alone; dropped when something else is seen.
+    pub still: Still,
 }
 
 impl Exposure<'_> {
@@ -95,15 +107,15 @@ impl Exposure<'_> {
         }
     }
 
-    /// Calls `act` with what `make` returned in the view's first frame.
+    /// Calls `act` with what `make` returned when the sensor first saw what it sees now.
     pub fn with_kept(
         &mut self,
         id: &'static str,
         make: impl FnOnce(&Self) -> Vec<f32>,
         act: impl FnOnce(&mut Self, &[f32]),
     ) {
-        let kept = self.memory.remove(id).unwrap_or_else(|| make(self));
+        let kept = self.still.remove(&(id, Kept::Made)).unwrap_or_else(|| make(self));
         act(self, &kept);
-        self.memory.insert(id, kept);
+        self.still.insert((id, Kept::Made), kept);
     }
 }

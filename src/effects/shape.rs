@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Card, Carded, Draw, Effect, Exposure, Settings, Stage};
+use super::{Card, Carded, Draw, Effect, Exposure, Kept, Settings, Stage};
 use crate::plane::Plane;
 use crate::scene::Seen;
 use crate::stats::median_in_place;
@@ -70,7 +70,7 @@ impl Effect for Shape {
     fn forward(&self, _: &Settings, exposure: &mut Exposure, _: &Draw) {
         let (moving, still): (Vec<&Term>, Vec<&Term>) =
             self.terms.iter().partition(|t| t.needs().session);
-        let kept = exposure.still.remove(self.card.id);
+        let kept = exposure.still.remove(&(self.card.id, Kept::Shape));
         let at_rest = kept.unwrap_or_else(|| values(&still, exposure));
         if moving.is_empty() {
             self.change(exposure, &at_rest);
@@ -79,7 +79,7 @@ impl Effect for Shape {
             now.iter_mut().zip(&at_rest).for_each(|(n, r)| *n += r);
             self.change(exposure, &now);
         }
-        exposure.still.insert(self.card.id, at_rest);
+        exposure.still.insert((self.card.id, Kept::Shape), at_rest);
     }
 }
 

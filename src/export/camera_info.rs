@@ -1,7 +1,7 @@
 //! The YAML of ROS' camera_info_manager (camera_calibration_parsers): the intrinsics.
 
 use super::Exported;
-use super::expressions::number;
+use super::expressions::yaml_float;
 use super::tables::known;
 use crate::error::Result;
 use crate::model::NoiseModel;
@@ -15,7 +15,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
         .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' })
         .collect();
     let matrix = |name: &str, rows: usize, cols: usize, data: &[f64]| {
-        let data: Vec<String> = data.iter().copied().map(number).collect();
+        let data: Vec<String> = data.iter().copied().map(yaml_float).collect();
         format!("{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]\n", data.join(", "))
     };
     let (fx, fy, cx, cy) = (camera.fx, camera.fy, camera.cx, camera.cy);

@@ -4,7 +4,7 @@
 //! of lateral_factor z (elevation_mapping/src/sensor_processors/StructuredLightSensorProcessor.cpp).
 
 use super::Exported;
-use super::expressions::number;
+use super::expressions::yaml_float;
 use super::tables::even;
 use crate::error::Result;
 use crate::model::{Direction, Form, NoiseModel, SigmaModel};
@@ -99,19 +99,4 @@ fn worst(sigma: &SigmaModel, theta: f64, [a, b, c, d, e]: &[f64; 5]) -> f64 {
         (processor / sigma.axial_sigma(z, theta) - 1.0).abs()
     };
     even(sigma.domain.z_m, NODES).into_iter().map(off).fold(0.0, f64::max)
-}
-
-/// YAML 1.1 reads 1e-5 as text: a float needs a decimal point ...
-fn yaml_float(v: f64) -> String {
-    let text = number(v);
-    match text.split_once('e') {
-        Some((head, power)) if !head.contains('.') => format!("{head}.0e{}", signed(power)),
-        Some((head, power)) => format!("{head}e{}", signed(power)),
-        None => text,
-    }
-}
-
-/// ... and its exponent a sign.
-fn signed(power: &str) -> String {
-    if power.starts_with('-') { power.into() } else { format!("+{power}") }
 }

@@ -11,6 +11,15 @@ pub(super) fn number(v: f64) -> String {
     format!("{v:?}")
 }
 
+/// The same for YAML 1.1, which reads 1e-5 as text: a decimal point, and a sign of the exponent.
+pub(super) fn yaml_float(v: f64) -> String {
+    let text = number(v);
+    let Some((head, power)) = text.split_once('e') else { return text };
+    let point = if head.contains('.') { "" } else { ".0" };
+    let sign = if power.starts_with('-') { "" } else { "+" };
+    format!("{head}{point}e{sign}{power}")
+}
+
 /// Sigma, m, at `z` and `theta` inside the range where the model holds.
 pub(super) fn sigma(model: &SigmaModel, prefix: &str) -> String {
     let p: Vec<String> = model.parameters.iter().copied().map(number).collect();

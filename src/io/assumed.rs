@@ -109,11 +109,16 @@ impl Assumed {
     /// The Kinect of a fakenect dump with frames of `size` px, and what was assumed of it.
     pub(super) fn dump_sensor(&self, size: (usize, usize)) -> Result<(Sensor, Option<String>)> {
         let known = self.intrinsics.is_some() || self.preset.is_some();
-        let remark = (!known || self.code.is_none()).then(|| {
-            "a fakenect dump carries no calibration: OpenKinect's depth formula and f = 585 px assumed; \
-             give --intrinsics and --raw-disparity"
-                .into()
-        });
+        let (formula, focal) = ("OpenKinect's depth formula", "f = 585 px");
+        let remark = match (known, self.code.is_some()) {
+            (true, true) => None,
+            (false, false) => Some(format!(
+                "{formula} and {focal} assumed; give --intrinsics and --raw-disparity"
+            )),
+            (true, false) => Some(format!("{formula} assumed; give --raw-disparity")),
+            (false, true) => Some(format!("{focal} assumed; give --intrinsics")),
+        };
+        let remark = remark.map(|what| format!("a fakenect dump carries no calibration: {what}"));
         let baseline_m = self.baseline_m.or(Some(KINECT_BASELINE_M));
         let kinect = Assumed { baseline_m, ..self.clone() };
         let name = "Kinect for Xbox 360 (fakenect dump)";

@@ -287,13 +287,7 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
             "choose a new folder, or give --force to replace what is there",
         ),
         Leaves::Results { names, marks } => {
-            let known = |name: &str| {
-                names
-                    .iter()
-                    .copied()
-                    .flatten()
-                    .any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
-            };
+            let known = |name: &str| names.iter().any(|names| is_one_of(names, name));
             let mut others = there.clone();
             // A file of a common name is this command's only if a mark is there too.
             let marked = there.iter().any(|name| marks.contains(&name.as_str()));
@@ -310,6 +304,11 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
     }
 }
 
+/// Whether `name` is one of these; a name that ends in `-` stands for all that begin so.
+fn is_one_of(names: &[&str], name: &str) -> bool {
+    names.iter().any(|n| *n == name || (n.ends_with('-') && name.starts_with(n)))
+}
+
 /// Fails if the output would replace `input`.
 fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
     // A missing input is reported by its reader.
@@ -319,7 +318,7 @@ fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
     let first = within.iter().next().unwrap_or_default().to_string_lossy();
     let replaced = match leaves {
         Leaves::Recording => true,
-        Leaves::Results { names, .. } => names.iter().any(|names| names.contains(&&*first)),
+        Leaves::Results { names, .. } => names.iter().any(|names| is_one_of(names, &first)),
     };
     if replaced {
         let what = format!("the output would replace {}, which is read", input.display());

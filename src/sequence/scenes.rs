@@ -54,7 +54,8 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     truth.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     let size = size_of(&moments[0].depth)?;
     let own = "7-Scenes' own intrinsics 585,585,320,240";
-    match assumed.intrinsics {
+    let given = assumed.intrinsics.or(assumed.preset.map(|_| INTRINSICS));
+    match given {
         None => remarks.push(format!("{own} are used; give --intrinsics for another camera")),
         Some(given) if given != INTRINSICS => remarks.push(format!("--intrinsics replaces {own}")),
         Some(_) => {}

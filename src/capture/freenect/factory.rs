@@ -52,12 +52,16 @@ pub fn sensor(
 ) -> (Sensor, Vec<String>) {
     let factory = factory.and_then(|(plane, shift)| of_factory(&plane, shift));
     let mut remarks = Vec::new();
-    if factory.is_none() && (assumed.intrinsics.is_none() || assumed.code.is_none()) {
-        remarks.push(
-            "the sensor tells no calibration: OpenKinect's published one is written; give \
-             --intrinsics and --raw-disparity if you know this unit's"
-                .into(),
-        );
+    let missing = match (assumed.intrinsics.is_some(), assumed.code.is_some()) {
+        (true, true) => None,
+        (false, false) => Some(("calibration", "--intrinsics and --raw-disparity")),
+        (true, false) => Some(("depth formula", "--raw-disparity")),
+        (false, true) => Some(("intrinsics", "--intrinsics")),
+    };
+    if let Some((what, options)) = missing.filter(|_| factory.is_none()) {
+        remarks.push(format!(
+            "the sensor tells no {what}: what OpenKinect published is written; give {options} if you know this unit's"
+        ));
     }
     let (intrinsics, code, baseline_m) =
         factory.unwrap_or((INTRINSICS, OPENKINECT, KINECT_BASELINE_M));

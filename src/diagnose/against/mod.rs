@@ -16,7 +16,7 @@ use crate::diagnose::noise::structure::{Structure, structures};
 use crate::diagnose::noise::tails::{Confusers, tails};
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::texture_findings;
-use crate::diagnose::options::{DiagnoseOptions, MIN_VIEWS, measure_options};
+use crate::diagnose::options::{DiagnoseOptions, EACH_LEVEL, MIN_VIEWS, measure_options};
 use crate::diagnose::steps::lattice::Quantisation;
 use crate::diagnose::steps::{Steps, lattice};
 use crate::diagnose::views::field::Field;
@@ -108,7 +108,7 @@ impl Baseline {
         survey.compared();
         let kept = KeptPattern::of(&fields);
         let mut structure = structures(&fields, &[], &kept);
-        let textures = texture_findings(&structure, &none, 0.03 * options.level);
+        let textures = texture_findings(&structure, &none, EACH_LEVEL * options.level);
         survey.compare_frames(&fields, common(&structure, &textures, &none));
         let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };
         measure_tails(&mut structure, &fields, &[], &whitener);
@@ -116,7 +116,7 @@ impl Baseline {
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
         let confusers = Confusers { simulated: true, ..Confusers::default() };
         Baseline {
-            heavy: tails(&structure, &none, 0.03 * options.level, confusers).is_some(),
+            heavy: tails(&structure, &none, EACH_LEVEL * options.level, confusers).is_some(),
             fields,
             survey,
             structure,

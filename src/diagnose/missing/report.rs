@@ -10,7 +10,7 @@ use super::shapes::{Shape, Step};
 use crate::camera::Camera;
 use crate::diagnose::diagnosis::{Alternative, Curve, Detectable, Finding, Size, Status};
 use crate::diagnose::edges::shadow::Band;
-use crate::diagnose::finding::naming::{MIN_PROBABILITY, none_of_these, physics};
+use crate::diagnose::finding::naming::{MIN_PROBABILITY, ln_odds, none_of_these, physics};
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::parameters::estimate;
 use crate::diagnose::finding::shape::digits;
@@ -290,7 +290,7 @@ fn weighed(name: &'static str, gain: f64, rivals: &Rivals) -> Vec<Alternative> {
     odds.extend(
         rivals
             .filter(|r| r.0 != name)
-            .map(|(id, gain)| (id, (0.25 * (gain - best).clamp(-60.0, 0.0)).exp())),
+            .map(|(id, gain)| (id, ln_odds((gain - best).clamp(-60.0, 0.0)).exp())),
     );
     let total: f64 = odds.iter().map(|o| o.1).sum();
     let some = 1.0 - none_of_these(gain, curve, NAME_ADEQUATE);

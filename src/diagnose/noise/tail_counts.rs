@@ -115,8 +115,8 @@ pub fn patches(image: &[f32], width: usize) -> impl Iterator<Item = Patch> + '_ 
         sizes.select_nth_unstable_by(end, f32::total_cmp);
         let most = &sizes[..end];
         let square: f64 = most.iter().map(|r| f64::from(*r).powi(2)).sum();
-        // The inner 90 % of a Gaussian have .6225 of its variance.
-        let spread = (square / most.len() as f64 / 0.6225).sqrt() as f32;
+        // The inner 90 % of a Gaussian have .6230 of its variance.
+        let spread = (square / most.len() as f64 / 0.6230).sqrt() as f32;
         let sigma = mad.max(0.8 * spread);
         let coarse = mad < sigma;
         (sigma > 0.0).then_some(Patch { pixels, sigma, coarse })

@@ -231,7 +231,7 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
         (Coordinate::Temperature, reach.temperature),
         (Coordinate::Light, reach.light),
     ] {
-        if range[1] > range[0] * 1.05 {
+        if range[1] - range[0] > 0.05 * range[0].abs() {
             all.push(curve(over, range, 6));
         }
     }

@@ -73,8 +73,8 @@ pub struct Chunk {
     pub crc: Option<u32>,
 }
 
-/// Decompressed chunks kept: the threads of a machine walk through a few views at a time.
-const KEPT: usize = 8;
+/// Decompressed chunks kept, on a machine of few threads: each walks through one view at a time.
+const MIN_KEPT: usize = 8;
 
 #[derive(Debug)]
 pub struct Chunks {
@@ -152,7 +152,7 @@ impl Chunks {
         let whole = Arc::new(whole);
         let mut kept = kept();
         kept.push_back((number, whole.clone()));
-        if kept.len() > KEPT {
+        if kept.len() > MIN_KEPT.max(rayon::current_num_threads()) {
             kept.pop_front();
         }
         Ok(whole)

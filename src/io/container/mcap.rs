@@ -157,7 +157,10 @@ impl Walk {
         let end = self.chunks.source.length - MAGIC.len() as u64;
         match self.chunks.source.bytes(end, MAGIC.len() as u64, "the last bytes")? == MAGIC {
             true => Ok(()),
-            false => Err(self.cut(at)),
+            false => {
+                let what = String::from("the file does not end with MCAP's magic bytes");
+                Err(self.chunks.source.damaged(what, REMEDY_CUT))
+            }
         }
     }
 

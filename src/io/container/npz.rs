@@ -100,8 +100,8 @@ pub struct Inflater {
     open: Mutex<Vec<Onwards>>,
 }
 
-/// Readers kept open: one more than the threads that walk through views.
-const OPEN: usize = 9;
+/// Readers kept open, on a machine of few threads.
+const MIN_OPEN: usize = 8;
 
 #[derive(Debug)]
 struct Onwards {
@@ -130,7 +130,8 @@ impl Inflater {
         }
         reader.at = at + n;
         let mut open = open();
-        if open.len() == OPEN {
+        // One more than the threads that walk through views.
+        if open.len() > MIN_OPEN.max(rayon::current_num_threads()) {
             open.remove(0);
         }
         open.push(reader);

@@ -132,3 +132,42 @@ fn sigma_of(seen: &Seen, sigma: &SigmaLookup) -> Vec<f32> {
     };
     seen.depth.iter().zip(&seen.normal).map(of).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Room, around_the_desks};
+    use super::*;
+    use crate::rng::Seed;
+
+    /// Depth frames of these poses, a Kinect's 80 x 60 px, with one effect.
+    fn depths(poses: Vec<Pose>, effect: &str) -> Vec<Frame> {
+        let effects = vec![Active::parse(effect).expect("an effect")];
+        let film = Film {
+            sensor: Film::kinect(8),
+            room: Room::office(Seed(1)),
+            poses,
+            physics: Physics::Formula { sigma: SigmaModel::paper(), effects },
+            seed: Seed(1),
+        };
+        let rays = film.sensor.camera.rays();
+        let frames = 0..film.poses.len();
+        let mut shutter = Shutter::new(&film, &film.sensor, &rays);
+        shutter.shoot(frames).into_iter().map(|(_, depth)| depth).collect()
+    }
+
+    /// What an effect derives from the scene follows a moving camera: a later frame has the shadows that
+    /// it has as the first one.
+    #[test]
+    fn a_shadow_is_that_of_the_frame() {
+        let poses: Vec<Pose> = around_the_desks().into_iter().step_by(40).take(3).collect();
+        let film = depths(poses.clone(), "occlusion-shadow:share=1");
+        let shadows = |frame: &Frame| -> Vec<bool> { frame.raw.iter().map(|w| *w == 0).collect() };
+        let of_first = shadows(&film[0]);
+        assert!(of_first.contains(&true));
+        for (frame, pose) in film.iter().zip(&poses).skip(1) {
+            let alone = depths(vec![*pose], "occlusion-shadow:share=1");
+            assert_eq!(shadows(frame), shadows(&alone[0]));
+            assert_ne!(shadows(frame), of_first);
+        }
+    }
+}

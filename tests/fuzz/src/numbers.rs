@@ -40,7 +40,7 @@ pub fn model(data: &[u8]) -> bool {
                     assert!(!z.is_finite() || *sigma > 0.0, "sigma {sigma} at {z} m");
                 }
                 if correction.knows_uncertainty() {
-                    let sure = correction.uncertainty_m(&stored, &conditions);
+                    let sure = correction.uncertainty_m(&stored, &conditions).expect("its size");
                     assert!(sure.iter().all(|u| *u >= 0.0), "{:?}", sure.first());
                 }
             }

@@ -103,7 +103,7 @@ fn the_uncertainty_of_a_correction_is_its_covariance() {
         Correction::of(&model(&sensor, effects.clone()), &sensor).expect("a correction");
     let camera = &sensor.camera;
     let depth: Vec<f32> = (0..camera.pixels()).map(|i| 0.7 + 1e-5 * i as f32).collect();
-    let told = correction.uncertainty_m(&depth, &Conditions::default());
+    let told = correction.uncertainty_m(&depth, &Conditions::default()).expect("its size");
     let corner = kinoise::terms::corner_radius(camera);
     for i in (0..camera.pixels()).step_by(97) {
         let (u, v) = ((i % camera.width) as f64, (i / camera.width) as f64);
@@ -114,7 +114,10 @@ fn the_uncertainty_of_a_correction_is_its_covariance() {
         let expected = r2 * px2.sqrt() * z * z / FB;
         assert!((f64::from(told[i]) - expected).abs() < 1e-4 * expected + 1e-9, "{i}");
     }
-    assert!(correction.uncertainty_m(&[f32::NAN], &Conditions::default())[0].is_nan());
+    let nothing = vec![f32::NAN; camera.pixels()];
+    let told = correction.uncertainty_m(&nothing, &Conditions::default()).expect("its size");
+    assert!(told.iter().all(|u| u.is_nan()));
+    assert!(correction.uncertainty_m(&depth[1..], &Conditions::default()).is_err());
 
     let files = Files::new();
     let recording = files.recording(METRIC, Vec::new());
