@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Golden outputs: what a move, a rename or a tidy-up must leave as it was, byte for byte.
+# Golden outputs, which a move, a rename or a tidy-up must leave identical byte for byte.
 #   tests/goldens.sh            makes them again and compares with tests/goldens.sha256
 #   tests/goldens.sh --quick    the demo, the simulators and the small sets only
-#   tests/goldens.sh --update   writes tests/goldens.sha256 (after a change of numbers that was meant)
-# Binaries: $KINOISE and $RAYTRACED (the maker of concealed sets), built here when not given. What was
-# made stays under $OUT (out/goldens) for a look at what differs.
+#   tests/goldens.sh --update   writes tests/goldens.sha256 (after an intended change of numbers)
+# Binaries: $KINOISE and $RAYTRACED (the maker of concealed sets), built here if not given. The outputs
+# stay under $OUT (out/goldens) for a look at what differs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 here=$PWD
@@ -57,7 +57,7 @@ referenced - 500 44 small
 SETS
 }
 
-# Every effect at its usual size, as `kinoise effects` tells it.
+# Every effect at its usual size, as listed by `kinoise effects`.
 effects() {
   cat <<'EFFECTS'
 disparity-quantisation:step_px=0.125
@@ -141,8 +141,8 @@ demo
 simulators
 if [ "$mode" = --quick ]; then concealed small; else concealed all; herrera; fi
 
-# Pages and pictures are looked at, not held; the log holds times. Results have a line each, the many
-# images of a recording one together.
+# Pages and pictures are for inspection and are not compared, nor is the log, which holds times. Each
+# result has a line of its own; the many images of a recording share one.
 find . -type f ! -name '*.html' ! -name '*.svg' ! -name 'sigma*.png' ! -name log ! -name stats.json ! -name SHA256SUMS -print0 |
   sort -z | xargs -0 sha256sum >SHA256SUMS
 results='/(diagnosis\.json|model\.json|measurements\.csv|trajectory\.txt|map\.ply)$'
@@ -159,7 +159,7 @@ case "$mode" in
     echo "wrote tests/goldens.sha256: $(wc -l <made.sha256) lines for $(wc -l <SHA256SUMS) files"
     ;;
   *)
-    # A line that is missing is a difference too, unless it was not asked for.
+    # A missing line is a difference too, unless it was not asked for.
     differ=$(diff "$sums" made.sha256 | grep '^[<>]' | awk '{print $3}' | sort -u || true)
     if [ "$mode" = --quick ]; then
       differ=$(for line in $differ; do if [ -e "${line%/\*}" ]; then echo "$line"; fi; done)

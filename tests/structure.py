@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The shape of src: no circle of files inside a folder, and imports that only point upward.
+"""Checks the imports of src: no cycles of files, and imports only from modules listed above.
 
-Reads the `use` lines and the `crate::`, `super::` and child-module paths of every file (tests left
-out), follows re-exports to the file that defines a name, and checks
-  1. that the files' imports hold no circle; what a folder's own mod.rs declares is open to every
-     file of the folder,
+Reads the `use` lines and the `crate::`, `super::` and child-module paths of every file (tests
+excluded), follows re-exports to the file that defines a name, and checks
+  1. that the files' imports contain no cycle; every file of a folder may use what the folder's own
+     mod.rs declares,
   2. that a module imports only from modules listed above it in src/lib.rs.
-Prints what breaks a rule and exits with 1.   python3 tests/structure.py [FOLDER]   (default: src)
+Prints violations and exits with 1.   python3 tests/structure.py [FOLDER]   (default: src)
 """
 
 import re
@@ -15,7 +15,7 @@ from pathlib import Path
 
 
 def strip(text):
-    """Code alone: no comments, no strings, no unit tests."""
+    """The code without comments, strings and unit tests."""
     text = re.sub(r'r#"(?:.|\n)*?"#|"(?:[^"\\]|\\.|\\\n)*"', '""', text)
     text = re.sub(r"//[^\n]*", "", text)
     text = re.sub(r"#\[cfg\(test\)\]\s*(#\[path[^\]]*\]\s*)?(pub )?mod \w+;", "", text)
@@ -23,7 +23,7 @@ def strip(text):
 
 
 def leaves(tree, prefix=()):
-    """The paths of a use tree, without its aliases."""
+    """Paths of a use tree, without aliases."""
     tree = tree.strip()
     brace = tree.find("{")
     if brace < 0:
@@ -72,7 +72,7 @@ class Tree:
             self.files[tuple(parts)] = File(path, tuple(parts))
 
     def absolute(self, module, path):
-        """From the crate's root, or nothing where the path is of another crate."""
+        """The path from the crate's root; None for a path of another crate."""
         head, *rest = path
         if head == "crate":
             return tuple(rest)
@@ -85,7 +85,7 @@ class Tree:
         return (*module, *path) if (*module, head) in self.files else None
 
     def defined_in(self, path, seen=()):
-        """The modules that define what a path from the root names."""
+        """Modules that define what a path from the root names."""
         module = ()
         while len(module) < len(path) and (*module, path[len(module)]) in self.files:
             module = (*module, path[len(module)])
@@ -111,7 +111,7 @@ class Tree:
 
 
 def circles(edges):
-    """Groups of files that import one another, round about (Tarjan)."""
+    """Groups of files that import one another in a cycle (Tarjan)."""
     graph = {}
     for a, b in edges:
         graph.setdefault(a, set()).add(b)

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Concealed sets of another hand: made by numpy alone, by other formulas than the catalogue's.
+"""Independent concealed sets: made with numpy only, by other formulas than the catalogue's.
 
-A board is seen before a wall at 640 x 480, 18 poses of 4 frames, with white noise of Eq. 1 and one cause. The
-model is calibrated on a clean recording of the same sensor, or, in a third of the sets, on the concealed one
-itself; there the noise may obey Eq. 1 across the plane. Every set is a line: the cause and its size, what was
+A board in front of a wall at 640 x 480, 18 poses of 4 frames, with white noise of Eq. 1 and one cause. The
+model is calibrated on a clean recording of the same sensor or, in three of ten sets, on the concealed recording
+itself; there the noise may obey Eq. 1 across the plane. Each set prints a line: the cause and its size, what was
 found with its share, and whether the cause's name came first, came at all, or was missed; "out-..." has no name
-in the catalogue. A pair has two causes at once: both, one or none of their names are found, or a wrong one beside them.
+in the catalogue. A pair has two causes at once: both, one or none of their names are found, or a wrong one too.
 It shares nothing with the trial but the layout of a recording. A law of depth and tilt alone
-(range-exponent, slope-noise) is sigma's own form where the model was calibrated on the same recording.
+(range-exponent, slope-noise) is part of sigma where the model was calibrated on the same recording.
 
     foreign_sets.py [--kinoise BIN] [--repeat N] [--seed S] [--jobs J] [--keep DIR] [--pairs N | CAUSE ...]
 """
@@ -33,7 +33,7 @@ def eq1(z, t):
 
 
 class Sensor:
-    """What it does to a view `v` beyond white noise; each list holds functions of the view."""
+    """Its effects on a view `v` beyond white noise; each list holds functions of the view."""
 
     def __init__(self, rng, across):
         self.rng, self.across = rng, across
@@ -85,7 +85,7 @@ class Sensor:
         (folder / "depth").mkdir(parents=True)
         for k in range(FRAMES):
             moved = np.where(on, z * (1 - self.velocity * k / 30 / z0), z)
-            # A target that moves has the noise of where it is.
+            # A moving target has the noise of its current depth.
             nearer = eq1(moved, v["theta"]) / eq1(z, v["theta"]) * (z / moved) ** 2
             d = PX_M / moved + bias + sigma * nearer * self.noise(v, k)
             d = self.mixing(v, d) if self.mixing else d
@@ -127,7 +127,7 @@ def signed(rng, low, high):
 
 
 def simple(name, low, high, change, sign=size):
-    """A cause of one number: `change` puts a function of the view into the sensor."""
+    """A cause with one parameter; `change` adds a function of the view to the sensor."""
 
     def make(s, rng):
         number = sign(rng, low, high)
@@ -212,7 +212,7 @@ def fixed_pattern_noise(s, rng):
 
 @cause
 def edge_mixing(s, rng):
-    """The mean depth under a blur of the edge takes the place of what is there."""
+    """Replaces disparities near the edge by their mean under a blur."""
     width = size(rng, 1.0, 3.5)
 
     def mixing(v, d):
@@ -251,7 +251,7 @@ def temporal_correlation(s, rng):
 
 
 def pairs(seed, count):
-    """Causes that can be at once: no two set the same property of the sensor."""
+    """Pairs of causes that can act together: no two set the same property of the sensor."""
     rng, drawn = np.random.default_rng([seed, len(CAUSES)]), []
     named = [c for c in CAUSES if c != "clean" and not c.startswith("out-")]
     shared = {"reference_m", "print", "lit"}

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Sensors of white noise whose sigma obeys another formula than the one that is fitted.
+"""Sensors with white noise whose sigma obeys another formula than the fitted one.
 
-Views of a plane are made by numpy alone, with noise that has no cause but its size: Eq. 1 of the paper
+Views of a plane are made with numpy only, with noise that differs in nothing but its sigma: Eq. 1 of the paper
 along the axis, Eq. 1 across the plane, Nguyen's formula, and k z^2. `kinoise diagnose` then calibrates on
 the recording and looks for causes. "Calibrate again" is a right answer, a physical name is a wrong one.
-With --curved, depth is the range along the ray, as of a camera whose driver mixes the two: a wall comes
-out curved, which must be told as a mismatch and not refused. With --foreign, sigma is not fitted to the
-recording but to a sensor that obeys the next of these formulas.
+With --curved, depth is the range along the ray, as from a camera whose driver confuses the two: a wall
+looks curved, which must be reported as a mismatch and not refused. With --foreign, sigma is not fitted to
+the recording but to a sensor that obeys the next of these formulas.
 
     form_misfits.py [--kinoise BIN] [--sets N] [--seed S] [--jobs J] [--curved] [--foreign]
 """
@@ -74,7 +74,7 @@ def recording(folder, sigma, curved, rng):
 
 
 def foreign_model(args, place, form, rng):
-    """The calibration of a sensor of the next formula."""
+    """Calibrates a sensor that obeys the next formula; returns the model option."""
     forms = list(FORMS)
     other = forms[(forms.index(form) + 1) % len(forms)]
     recording(place / "other", FORMS[other], False, rng)

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""What a learnt model is worth to the map, as a CSV with a row a map.
+"""What a learnt model is worth to the map, as a CSV with one row per map.
 
 films: real sequences with ground truth. `calibrate` and `diagnose` learn from a recording; every film is
-    mapped raw with equal weights, with Eq. 1 and with the calibrated sigma, and without the biases found
+    mapped raw with equal weights, with Eq. 1 and with the calibrated sigma, and corrected for the biases found
     with Eq. 1 and with the calibrated sigma.
-seeds: for each --effect, and in the world of light for each --cause (several of one sensor: joined by +;
-    "none" for a sensor as it is), a simulated sensor a seed. It takes views of a wall, from which `calibrate` fits sigma alone and `diagnose` extends the model with the causes it
-    finds. The same sensor films the office, and the film is mapped with both. Tells how often the
-    extended model is the worse one.
+seeds: for each --effect, and in the speckle simulator for each --cause (several of one sensor: joined by +;
+    "none" for a sensor as it is), one simulated sensor per seed. It takes views of a wall, from which
+    `calibrate` fits sigma alone and `diagnose` extends the model with the causes it finds. The same sensor
+    films the office, and the film is mapped with both models. Prints how often the extended model is worse.
 
     map_worth.py [--kinoise BIN] --csv FILE films --recording DIR FILM...
     map_worth.py [--kinoise BIN] --csv FILE seeds [--seeds N] [--effect ID:KEY=VALUE]... [--cause NAME=VALUE]... [--frames N] [--shrink N]
@@ -15,9 +15,9 @@ seeds: for each --effect, and in the world of light for each --cause (several of
 import argparse, csv, json, pathlib, subprocess, sys, tempfile
 
 DISTANCES, TILTS = "1,1.5,2,3,4", "0,17,34"
-# Of the boards' reference distances, m: without any a model cannot learn a scale. A tape measure's.
+# Error of the boards' reference distances, m, as of a tape measure; without any a model cannot learn a scale.
 REFERENCE_ERROR_M = 0.002
-# The paper's Eq. 1 where it was measured.
+# The paper's Eq. 1 over its measured range.
 EQ_1 = dict(a=0.00151, b=0.00215, c=0.483, d=1.88e-6, e=2.01, f=1.39)
 EQ_1_VALID = {"z_m": [1.0, 4.0], "theta_rad": [0.0, 1.38]}
 METHODS = "best", "projective", "paper"
@@ -51,7 +51,7 @@ class Kinoise:
             sys.exit(f"{' '.join(map(str, words))}: {done.stderr}")
 
     def learn(self, recording, at):
-        """The bare model's file, the extended one's, and the causes found."""
+        """Returns the files of the bare and of the extended model, and the causes found."""
         bare, extended = at / "bare/model.json", at / "extended/model.json"
         self("calibrate", recording, "-o", bare.parent)
         self("diagnose", recording, "--model", bare, "-o", extended.parent)
@@ -87,7 +87,7 @@ def films(kinoise, a, at):
 
 
 def with_eq_1(model):
-    """The same biases, with the paper's sigma of pixels that err each for itself."""
+    """The same biases with the paper's sigma and independent pixels."""
     effects = [e for e in model["effects"] if e["id"] != "spatial-correlation"]
     parameters = {name: {"value": value, "std_error": None} for name, value in EQ_1.items()}
     sigma = {**model["sigma"], "form": "paper", "parameters": parameters, "valid": EQ_1_VALID}
@@ -112,7 +112,7 @@ def sensors(a, at, name, world):
         kinoise("simulate", here / "wall", "--wall-target", "--distances", DISTANCES, "--tilts", TILTS,
                 "--azimuths", "0", "--frames", 2, "--reference-error", REFERENCE_ERROR_M, "--shrink", a.shrink, *world)
         bare, extended, found = kinoise.learn(here / "wall", here)
-        # By light a model brings its sensor alone; by formula it would bring its sigma too.
+        # In the speckle simulator a model brings its sensor only; by formula it would bring its sigma too.
         sensor = ["-m", bare] if "--physics" in world else ["--shrink", a.shrink]
         kinoise("simulate", here / "film", "--room", "--frames", a.frames, *sensor, *world)
         before, after = (kinoise.errors(here / "film", "-m", model) for model in (bare, extended))
@@ -128,7 +128,7 @@ def main():
         table = csv.writer(out, lineterminator="\n")
         for row in {"films": films, "seeds": seeds}[a.kind](Kinoise(a.kinoise), a, pathlib.Path(folder)):
             table.writerow(row)
-            out.flush()  # what is there is of use when it is stopped
+            out.flush()  # an interrupted run leaves its rows
             print(*row, sep="  ", flush=True)
     beside.replace(a.csv)
 

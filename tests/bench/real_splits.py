@@ -2,10 +2,10 @@
 """What a correction learnt from some views of a real sensor is worth on its other views.
 
 Splits a recording of planes into halves and into fifths (copies in a scratch folder), runs
-`kinoise diagnose` on the one part and `kinoise correct` with the model it wrote on the other, and
-measures the root mean square around each view's plane, over pixels, in steps of the raw code.
-Beside it stands what a page of numpy reaches: two smooth maps over the picture, one of them times
-the square of the disparity, fitted to the same views.
+`kinoise diagnose` on one part and `kinoise correct` with its model on the other, and measures
+the root mean square around each view's plane, over pixels, in steps of the raw code.
+For comparison, a page of numpy fits two smooth maps over the image to the same views, one of them
+times the square of the disparity.
 
     real_splits.py RECORDING [--kinoise BIN] [--halves N] [--folds K] [--seed S] [--jobs J]
     real_splits.py FOLDER_OF_PNGS --intrinsics FX FY CX CY --disparity OFFSET SLOPE --views NAME ...
@@ -18,9 +18,9 @@ try:
 except ImportError as missing:
     sys.exit(f"{missing}: this bench needs python3 with numpy and Pillow")
 
-STEP = 6  # One pixel in 36 is looked at.
+STEP = 6  # One pixel in 36 is used.
 ACROSS, DOWN = 20, 15  # Splines of a map.
-SMOOTH, RIDGE = 3.0, 0.3  # Of the maps' second differences and values, in raw units and pixels.
+SMOOTH, RIDGE = 3.0, 0.3  # Penalties on the maps' second differences and values, in raw units and pixels.
 BASELINE_M = 0.075
 
 
@@ -41,7 +41,7 @@ def arguments():
 
 
 def as_recording(args, folder):
-    """A plain folder of PNGs as a recording, by links."""
+    """Makes a recording of a plain folder of PNGs, by links."""
     fx, fy, cx, cy = args.intrinsics
     files = sorted(args.recording.glob("*.png"))
     width, height = Image.open(files[0]).size
@@ -77,7 +77,7 @@ class View:
         d = raw[v, u]
         x = np.stack([np.ones(len(d)), (u - about["cx"]) / about["fx"], (v - about["cy"]) / about["fy"]], 1)
         weight, s = np.ones(len(d)), 1.0
-        for _ in range(30):  # Cauchy's weights.
+        for _ in range(30):  # Cauchy weights.
             b = np.linalg.lstsq(x * weight[:, None], d * weight, rcond=None)[0]
             r = d - x @ b
             s = max(1.4826 * np.median(np.abs(r - np.median(r))), 0.5)
@@ -92,7 +92,7 @@ class View:
         return np.array([(r**2).sum(), ok.sum()])
 
     def corrected(self, folder, code):
-        """What `correct` wrote of this view, in the raw units that were read."""
+        """What `correct` wrote for this view, in the raw units of the input."""
         about = json.loads((folder / "recording.json").read_text())
         word = np.array(Image.open(depth_file(folder / self.name))).astype(float)[self.v, self.u]
         if "raw_disparity" in about:
@@ -102,7 +102,7 @@ class View:
 
 
 class Page:
-    """The page of numpy."""
+    """The correction by a page of numpy."""
 
     def __init__(self, views, about):
         code, fb = about["raw_disparity"], about["fx"] * about.get("baseline_m", BASELINE_M)
@@ -140,7 +140,7 @@ class Page:
 
 
 def copies(recording, views, folder):
-    """A recording of some of the views: copies, for `correct` refuses links that lead out of it."""
+    """A recording of some of the views, as copies: `correct` refuses links that lead out of it."""
     folder.mkdir(parents=True)
     shutil.copy(recording / "recording.json", folder)
     for view in views:
@@ -161,7 +161,7 @@ def rms(squares):
 
 
 def split(args, recording, about, page, name, taught, judged, work):
-    """One row: nothing, the page of numpy, kinoise; and what was named."""
+    """One row: no correction, the page of numpy, kinoise; and the names found."""
     row = {"split": name, "nothing": [w.square(w.d) for w in judged], "page": page.judge(taught, judged)}
     if args.kinoise == "none":
         return row

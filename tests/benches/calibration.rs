@@ -20,7 +20,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// 8 f b of a Kinect v1, px m: raw disparity steps are 1/8 px.
 const STEPS: f64 = 8.0 * 580.0 * 0.075;
 
-/// A wall at 1.5 m turned by 30 degrees, a tenth of the pixels clutter at 0.9 m: calib.py's.
+/// The scene of calib.py: a wall at 1.5 m turned by 30 degrees, with a tenth of the pixels clutter at 0.9 m.
 fn wall() -> (Points, Plane) {
     let sensor = kinect_v1(1);
     let rays = sensor.camera.rays();
@@ -41,8 +41,8 @@ fn wall() -> (Points, Plane) {
     (points, plane)
 }
 
-/// The very points calib.py left in its work folder (float32 x, y, z), given by
-/// KINOISE_PLANE_XYZ; its wall has the normal (sin .52, 0, cos .52) through (0, 0, 1.5).
+/// The points that calib.py left in its work folder (float32 x, y, z), given by KINOISE_PLANE_XYZ; its wall
+/// has the normal (sin .52, 0, cos .52) through (0, 0, 1.5).
 fn peers_wall() -> Option<(Points, Plane)> {
     let bytes = std::fs::read(std::env::var_os("KINOISE_PLANE_XYZ")?).ok()?;
     let mut points = Points::default();

@@ -1,9 +1,9 @@
-//! A whole diagnosis, beside the time that decoding its images takes on one thread: the ratio holds
-//! on faster and slower machines.
+//! Times a whole diagnosis, and the decoding of its images on one thread: their ratio holds on faster and
+//! slower machines.
 //!
-//! `cargo bench --bench diagnose`: 24 views of 8 frames of 640 x 480 px, and the real Kinect's 39
-//! views where KINOISE_DATA (../shared/data) has them. One run takes seconds, so it is timed whole.
-//! KINOISE_BENCH_RUNS is how often (3); the fastest counts, as on a loaded machine the others
+//! `cargo bench --bench diagnose`: 24 views of 8 frames of 640 x 480 px, and the real Kinect's 39 views
+//! where KINOISE_DATA (../shared/data) has them. One run takes seconds, so it is timed whole.
+//! KINOISE_BENCH_RUNS is the number of runs (3); the fastest counts, since on a loaded machine the others
 //! measure the load.
 
 #[allow(dead_code, unused_imports)]
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use kinoise::io::{Assumed, FrameSource, open};
 use raytraced::{Cell, Order, Set, write};
 
-/// What one recording may take on two threads.
+/// Limits of one recording on two threads.
 struct Mark {
     seconds: f64,
     megabytes: f64,
@@ -30,7 +30,7 @@ const REAL: Mark = Mark { seconds: 20.0, megabytes: 500.0 };
 const EFFECTS: [&str; 3] = ["radial-disparity-bias", "vignetting", "spatial-correlation"];
 
 fn main() -> ExitCode {
-    // `cargo test --benches` gives none of this; it is not to take a minute there.
+    // `cargo test --benches` does not pass --bench, and must not take a minute.
     if !std::env::args().any(|a| a == "--bench") {
         return ExitCode::SUCCESS;
     }
@@ -77,7 +77,7 @@ fn holds(what: &str, recording: &Path, model: Option<&Path>, mark: &Mark) -> boo
     seconds <= mark.seconds && megabytes <= mark.megabytes
 }
 
-/// Every depth image once.
+/// Decodes every depth image once.
 fn decode(root: &Path) -> Duration {
     let recording = open(root, &Assumed::default()).expect("a recording");
     let camera = &recording.sensor.camera;
@@ -89,7 +89,7 @@ fn decode(root: &Path) -> Duration {
     start.elapsed()
 }
 
-/// Time and the greatest memory, MB.
+/// Time and peak memory, MB.
 fn diagnose(recording: &Path, model: Option<&Path>) -> (Duration, f64) {
     let output = tempfile::tempdir().expect("a temporary folder");
     let start = Instant::now();

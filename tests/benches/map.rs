@@ -1,5 +1,5 @@
-//! Mapping the filmed office at 640 x 480 on one core, decoding included: ms for ten frames. The
-//! marks are ratios to peers run beside it (tests/tools/peer.py in ../shared/peers/bench.py).
+//! Time to map ten frames of the filmed office at 640 x 480 on one core, decoding included, ms. The targets
+//! are ratios to peers run beside it (tests/tools/peer.py in ../shared/peers/bench.py).
 
 use std::hint::black_box;
 

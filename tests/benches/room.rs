@@ -1,4 +1,4 @@
-//! A frame of the filmed office at 640 x 480 on one core: the mark is 60 ms for colour and depth.
+//! Time of a frame of the filmed office at 640 x 480 on one core; the target is 60 ms for colour and depth.
 
 use std::hint::black_box;
 
@@ -8,7 +8,7 @@ use kinoise::simulate::Physics;
 use kinoise::simulate::room::{Film, Room, RoomCamera, Shutter, around_the_desks};
 use kinoise::{Seed, SigmaModel};
 
-/// Every so many frames of the default path: views from all sides.
+/// Stride through the frames of the default path: views from all sides.
 const STRIDE: usize = 75;
 
 fn frames(c: &mut Criterion) {

@@ -1,5 +1,5 @@
-//! Speed of the simulator. A 640 x 480 frame by formula, correlated noise and no other effect, is
-//! to take at most 15 ms on one core (issue 3).
+//! Speed of the simulator. A 640 x 480 frame by formula, with correlated noise and no other effect, must
+//! take at most 15 ms on one core (issue 3).
 
 use std::hint::black_box;
 
@@ -9,7 +9,7 @@ use kinoise::scene::{Bench, Board, Seen, Target};
 use kinoise::simulate::{FormulaSensor, kinect_v1};
 use kinoise::{Plane, Seed, SigmaModel};
 
-/// Time to shoot one frame with these effects, the view begun.
+/// Time of one frame with these effects, in a view that has begun.
 fn frame(c: &mut Criterion, name: &str, effects: &[&str]) {
     let sensor = kinect_v1(1);
     let rays = sensor.camera.rays();
@@ -50,7 +50,7 @@ fn frames(c: &mut Criterion) {
     frame(c, "frame by formula, every effect", &all);
 }
 
-/// Casting a view: once a view, not once a frame.
+/// Casting the rays of a view, which is done once per view, not per frame.
 fn view(c: &mut Criterion) {
     let sensor = kinect_v1(1);
     let rays = sensor.camera.rays();

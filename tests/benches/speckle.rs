@@ -1,4 +1,4 @@
-//! Speed of the world by light. The budget is 0.5 s for a 640 x 480 frame on one core.
+//! Speed of the speckle simulator. The budget is 0.5 s for a 640 x 480 frame on one core.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use kinoise::effects::Instant;

@@ -1,14 +1,14 @@
-//! What the tests of `kinoise capture` share.
+//! Shared helpers of the `kinoise capture` tests.
 
 use assert_cmd::assert::Assert;
 use kinoise::io::FrameSource;
 use kinoise::{Frame, Recording};
 use serde_json::Value;
 
-/// Frames of a view, and of stillness before.
+/// Frames of a view, and still frames before it.
 pub const FRAMES: usize = 4;
 pub const HOLD: usize = 2;
-/// What a dump has of each pose: the first still frame, the view, one to spare.
+/// Frames of each pose in a dump: the first still frame, the view, one to spare.
 pub const HELD_STILL: usize = FRAMES + HOLD;
 
 pub fn folder() -> tempfile::TempDir {

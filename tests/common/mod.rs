@@ -1,4 +1,4 @@
-//! What the tests share: small recordings with a known truth, images of any kind, the binary.
+//! Shared test helpers: small recordings with a known truth, images of any kind, the binary.
 #![allow(dead_code)] // every test file uses a part
 
 pub mod capture;
@@ -16,7 +16,7 @@ use kinoise::{Form, Frame, Seed, SigmaModel};
 pub const BOARD_HEIGHT_M: f64 = 0.8;
 pub const BOARD: Target = Target::Board(Board { width_m: 1.0, height_m: BOARD_HEIGHT_M });
 
-/// Eq. 1 taken at its word wherever a board of this size reaches.
+/// Eq. 1 as published, wherever a board of this size reaches.
 pub fn truth() -> SigmaModel {
     let domain = Domain { z_m: [0.2, 10.0], theta_rad: [0.0, 1.37] };
     SigmaModel::published(Form::Paper, &PAPER_EQ1, domain)
@@ -29,7 +29,7 @@ pub fn grid(distances_m: &[f64], tilts_deg: &[f64]) -> Grid {
     }
 }
 
-/// Shots of 160 x 120 px: a view of the good recording weighs 20 kB.
+/// Shots of 160 x 120 px: a view of the good recording takes 20 kB.
 pub fn shots(grid: Grid, frames: usize, seed: u64) -> Shoot {
     Shoot::plain(kinect_v1(4), BOARD, &grid.views(), frames, truth(), Seed(seed))
 }
@@ -37,11 +37,11 @@ pub fn shots(grid: Grid, frames: usize, seed: u64) -> Shoot {
 /// Views of the good recording: four distances, three tilts, two frames each.
 pub const GOOD_VIEWS: usize = 12;
 
-/// A recording nothing is wrong with; made once a test program, copied by who spoils it.
+/// A recording with nothing wrong; made once per test program and copied by tests that damage it.
 pub fn good() -> &'static Path {
     static GOOD: OnceLock<tempfile::TempDir> = OnceLock::new();
     GOOD.get_or_init(|| {
-        // Statics are never dropped: below target/ nobody minds.
+        // Statics are never dropped; what is left below target/ does no harm.
         let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder");
         shots(grid(&[1.0, 1.5, 2.0, 3.0], &[0.0, 30.0, 60.0]), 2, 1)
             .write(folder.path(), &|_, _| ())
@@ -64,7 +64,7 @@ pub fn copy_tree(from: &Path, to: &Path) {
     }
 }
 
-/// Write a PNG of any kind; `data` as PNG wants it (big-endian words).
+/// Writes a PNG of any kind; `data` as PNG stores it (big-endian words).
 pub fn write_png(
     path: &Path,
     size: (u32, u32),
@@ -86,8 +86,8 @@ pub fn write_depth(path: &Path, frame: &Frame) {
     std::fs::write(path, kinoise::io::encode_png16(frame).expect("encoded")).expect("written");
 }
 
-/// Write depth frames into a new folder as fakenect-record would have: stamps in s, frames of
-/// 640 x 480 raw values. fakenect plays nothing else.
+/// Writes depth frames into a new folder as fakenect-record would: stamps in s, frames of 640 x 480 raw
+/// values. fakenect plays nothing else.
 pub fn write_dump<'a>(root: &Path, frames: impl IntoIterator<Item = (f64, &'a Frame)>) {
     std::fs::create_dir_all(root).expect("made");
     let mut index = String::new();
@@ -108,7 +108,7 @@ pub fn kinoise() -> Command {
     command
 }
 
-/// The real data, or `None` with a line that says what was skipped.
+/// Path of the real data; `None` where it is missing, after printing what is skipped.
 pub fn data(name: &str) -> Option<PathBuf> {
     let root = std::env::var_os("KINOISE_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
@@ -125,7 +125,7 @@ pub fn data(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// Every file below a folder with its bytes, in name order.
+/// All files below a folder with their bytes, in name order.
 pub fn tree(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut files = Vec::new();
     let mut folders = vec![root.to_path_buf()];

@@ -1,4 +1,4 @@
-//! Raytraced sets on disk, and what the diagnosis says of them.
+//! Raytraced sets on disk, and their diagnoses.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use kinoise::io::{Assumed, open};
 use kinoise::{NoiseModel, Seed};
 use serde_json::Value;
 
-/// Files of one set, gone when dropped.
+/// Files of one set, deleted on drop.
 pub struct OnDisk {
     pub folder: tempfile::TempDir,
     pub recording: PathBuf,
@@ -17,7 +17,7 @@ pub struct OnDisk {
     pub set: Set,
 }
 
-/// An order of 320 x 240 px at strength 1.
+/// An order of 320 x 240 px images at strength 1.
 pub fn order(cell: Cell, effect: &str, seed: u64, views: usize, frames: usize) -> Order {
     let effects = if effect.is_empty() { Vec::new() } else { vec![effect.to_string()] };
     let (views, frames) = (Some(views), Some(frames));
@@ -43,11 +43,11 @@ impl OnDisk {
 pub struct Said {
     pub json: Value,
     pub model: NoiseModel,
-    /// Numbers that are none.
+    /// Paths of numbers that are null.
     pub nulls: Vec<String>,
 }
 
-/// What is said of a recording against a model.
+/// Diagnosis of a recording against a model.
 #[track_caller]
 pub fn said(recording: &Path, model: &Path) -> Said {
     let recording = open(recording, &Assumed::default()).expect("a recording");
@@ -64,7 +64,7 @@ impl Said {
         self.json["verdict"].as_str().expect("a verdict")
     }
 
-    /// What was found; what cannot be known is left out.
+    /// The findings, without those that are not identifiable.
     pub fn findings(&self) -> Vec<&Value> {
         let all = self.json["findings"].as_array().expect("findings");
         all.iter().filter(|f| f["status"] != "not-identifiable").collect()
@@ -76,7 +76,7 @@ impl Said {
         findings.first().map_or("", |f| f["effect"].as_str().or(f["status"].as_str()).unwrap_or(""))
     }
 
-    /// Greatest probability of a name, with the name.
+    /// Largest probability of a name, with the name.
     pub fn surest(&self) -> (f64, String) {
         let all = self.findings();
         let names = all.iter().filter_map(|f| f["alternatives"].get(0));
@@ -84,7 +84,7 @@ impl Said {
         names.map(of).fold((0.0, String::new()), |best, a| if a.0 > best.0 { a } else { best })
     }
 
-    /// One line for people.
+    /// One-line summary for people.
     pub fn line(&self) -> String {
         let one = |f: &&Value| {
             let name = f["effect"].as_str().or(f["status"].as_str()).unwrap_or("");
@@ -102,8 +102,8 @@ pub fn text(value: &Value) -> String {
     value.as_str().unwrap_or("").to_string()
 }
 
-/// JSON has no NaN: a number that is none is a null, which only a standard error, a name, a next
-/// view, the score of views kept aside, and what no test gave may be.
+/// Paths of unexpected nulls. JSON has no NaN, so a missing number is null; that may be only a standard
+/// error, a name, a next view, the score of held-out views and results of tests not made.
 pub fn nulls(d: &Value) -> Vec<String> {
     fn walk(value: &Value, path: &str, found: &mut Vec<String>) {
         const MAY: [&str; 7] = [
@@ -131,7 +131,7 @@ pub fn nulls(d: &Value) -> Vec<String> {
     found
 }
 
-/// Fields, words, and ranges of `diagnosis.json`.
+/// Checks the fields, words and ranges of `diagnosis.json`.
 #[track_caller]
 pub fn well_formed(d: &Value) {
     assert_eq!(d["format"], "kinoise-diagnosis/1");
@@ -175,7 +175,7 @@ pub fn well_formed(d: &Value) {
     assert_eq!(verdict == "mismatch", found > 0, "{verdict} with {found} findings");
 }
 
-/// Change the text of a file.
+/// Changes the text of a file.
 #[track_caller]
 pub fn edit(path: &Path, change: impl Fn(&str) -> String) {
     let old = fs::read_to_string(path).expect("text");
@@ -195,7 +195,7 @@ pub fn views(recording: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// Write every depth image of a recording anew; `change` gets the view's number and the frame.
+/// Rewrites every depth image of a recording; `change` gets the view's index and the frame.
 pub fn repaint(recording: &Path, change: impl Fn(usize, &mut kinoise::Frame)) {
     for (k, view) in views(recording).iter().enumerate() {
         for image in fs::read_dir(view.join("depth")).expect("depth") {

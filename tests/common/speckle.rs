@@ -1,4 +1,4 @@
-//! A speckle sensor and what it says to a bench, as disparity errors.
+//! Disparity errors of a speckle sensor in front of a bench.
 
 use kinoise::effects::Instant;
 use kinoise::scene::{Bench, Target, World};
@@ -11,12 +11,12 @@ use nalgebra::Vector3;
 pub const FB: f64 = 580.0 * 0.075;
 const WIDTH: usize = 240;
 const HEIGHT: usize = 180;
-/// No window reaches over the picture's edge, px.
+/// Margin within which no matching window crosses the image's edge, px.
 const BORDER: usize = 9;
-/// A wrong match, px; the rest is noise.
+/// Errors from here on are wrong matches, px; the rest is noise.
 const GROSS_PX: f64 = 1.5;
 
-/// The middle of a Kinect's picture.
+/// The central part of a Kinect's image.
 pub fn kinect() -> Sensor {
     let mut sensor = kinect_v1(1);
     sensor.camera.width = WIDTH;
@@ -26,13 +26,13 @@ pub fn kinect() -> Sensor {
     sensor
 }
 
-/// A wall at this depth, tilt and direction of tilt in degrees.
+/// A wall at this depth in m, with tilt and direction of tilt in degrees.
 pub fn wall(z_m: f64, theta_deg: f64, azimuth_deg: f64) -> Bench {
     let plane = Plane::tilted(z_m, theta_deg.to_radians(), azimuth_deg.to_radians());
     Bench::bare(plane, Target::Wall)
 }
 
-/// A wall across the axis.
+/// A wall perpendicular to the optical axis.
 pub fn frontal(z_m: f64) -> Bench {
     wall(z_m, 0.0, 0.0)
 }
@@ -42,7 +42,7 @@ pub struct Watch {
     /// Disparity error, px, per frame and pixel: infinite where nothing was measured, NaN where
     /// there was nothing to measure.
     pub errors: Vec<Vec<f64>>,
-    /// Of all frames, m; NaN where nothing was measured.
+    /// Depths of all frames, m; NaN where nothing was measured.
     pub depths: Vec<f64>,
     infrared: Vec<u16>,
 }
@@ -89,7 +89,7 @@ impl Watch {
         watch
     }
 
-    /// Pixels that answered soundly in all frames: their errors over the frames.
+    /// Errors over the frames of the pixels that are sound in all frames.
     fn series(&self) -> Vec<Vec<f64>> {
         (0..WIDTH * HEIGHT)
             .map(|i| self.errors.iter().map(|frame| frame[i]).collect::<Vec<f64>>())
@@ -97,7 +97,7 @@ impl Watch {
             .collect()
     }
 
-    /// Sd of a pixel over the frames, px (root mean square over pixels).
+    /// Standard deviation of a pixel over the frames, px (root mean square over pixels).
     pub fn temporal_px(&self) -> f64 {
         let n = self.errors.len() as f64;
         let series = self.series();
@@ -105,7 +105,7 @@ impl Watch {
         (sum / series.len() as f64).sqrt()
     }
 
-    /// Sd over the pixels of what stands still, px.
+    /// Standard deviation over the pixels of the part that is constant in time, px.
     pub fn frozen_px(&self) -> f64 {
         let n = self.errors.len() as f64;
         let series = self.series();
@@ -121,7 +121,7 @@ impl Watch {
         none / n
     }
 
-    /// Missing pixels between two columns, a row.
+    /// Missing pixels between two columns, per row.
     pub fn missing_per_row(&self, columns: (f64, f64), rows: (usize, usize)) -> f64 {
         let none = (0..WIDTH * HEIGHT).filter(|i| {
             let (u, v) = ((i % WIDTH) as f64, i / WIDTH);
@@ -155,7 +155,7 @@ impl Watch {
         sum / n
     }
 
-    /// Of the error over the columns, px a px.
+    /// Slope of the error over the columns, px per px.
     pub fn slope_per_px(&self) -> f64 {
         let columns = variance(self.sound().map(|(u, _)| u));
         let middle = (WIDTH as f64 - 1.0) / 2.0;
@@ -164,7 +164,7 @@ impl Watch {
         sum / n / columns
     }
 
-    /// Root mean square of the error averaged over blocks of 20 x 20 px, px: what is smooth.
+    /// Root mean square of the error averaged over blocks of 20 x 20 px, px: the smooth part.
     pub fn smooth_px(&self) -> f64 {
         const SIDE: usize = 20;
         let mut blocks = vec![(0.0, 0.0); (WIDTH / SIDE) * (HEIGHT / SIDE)];
@@ -176,7 +176,7 @@ impl Watch {
         (squares / blocks.len() as f64).sqrt()
     }
 
-    /// Columns from .. to without light: a tenth of what the first six have.
+    /// Number of columns in this range without light: less than a tenth of the first six's mean.
     pub fn dark_columns(&self, columns: (f64, f64)) -> f64 {
         let black = f64::from(self.infrared.iter().copied().min().unwrap_or(0));
         let light: Vec<f64> = (columns.0.ceil() as usize..columns.1 as usize)
@@ -189,7 +189,7 @@ impl Watch {
         light.iter().filter(|l| **l < 0.1 * wall).count() as f64
     }
 
-    /// Mean infrared light in the middle of the picture over the darkest pixel there, DN.
+    /// Mean infrared light in the middle of the image above the darkest pixel there, DN.
     pub fn middle_light_dn(&self) -> f64 {
         let middle: Vec<f64> = (0..WIDTH * HEIGHT)
             .filter(|i| (i % WIDTH).abs_diff(120) < 40 && (i / WIDTH).abs_diff(90) < 60)

@@ -1,4 +1,4 @@
-//! A ripple over the rows. Not of the product: `tests/slow/new_effect.rs` adds it.
+//! A ripple over the rows. Not part of the product: `tests/slow/new_effect.rs` adds it.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! `diagnose --against`: somebody else's simulation in the model's place.
+//! `diagnose --against`: a simulated recording in place of the model.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ impl Sets {
         Sets { folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
-    /// A wall seen from twelve poses, in an order of its own.
+    /// A wall seen from twelve poses, in random order.
     fn shoot(&self, name: &str, seed: u64, effect: Option<&str>) -> PathBuf {
         self.shoot_with(name, seed, effect, &[0.9, 1.3, 1.9, 2.7], 2)
     }
@@ -43,7 +43,7 @@ impl Sets {
         root
     }
 
-    /// Exit code and `diagnosis.json`.
+    /// Returns the exit code and `diagnosis.json`.
     fn run(&self, real: &Path, simulated: &Path) -> (Option<i32>, Value) {
         let out = self.folder.path().join("out");
         let run = common::kinoise()
@@ -73,8 +73,8 @@ fn names(diagnosis: &Value) -> Vec<&str> {
     told.map(|f| f["effect"].as_str().unwrap_or("none")).collect()
 }
 
-/// Noise that hardly changes from frame to frame is measured alike in both, on which side of any
-/// limit its changes fall. Six pairs of runs at 3 %: two alarms have a chance of 1.3 %.
+/// Nearly frozen noise is measured alike in both recordings, whichever side of a limit its changes fall on.
+/// Six pairs of runs at 3 % false alarms: two alarms have a probability of 1.3 %.
 #[test]
 #[ignore = "slow: six pairs of recordings"]
 fn two_runs_of_noise_that_stands_still_match() {
@@ -105,7 +105,7 @@ fn what_a_simulation_leaves_out_is_named_and_what_both_have_is_not() {
     assert_eq!(found["reference"], "simulated recording");
     let k = &found["findings"][0]["parameters"]["k_px"]["value"];
     assert!((k.as_f64().expect("a number") - 0.3).abs() < 0.02, "{k}");
-    // The simulation has it too much: the same, with the other sign.
+    // Here the simulation has too much of it: the same finding with the opposite sign.
     let found = sets.diagnose(&clean, &real, 1);
     assert_eq!(names(&found), ["radial-disparity-bias"]);
     assert!(
@@ -130,7 +130,7 @@ fn noise_is_compared_with_the_simulated_noise() {
         let seed = 10 * (n as u64 + 1);
         let real = sets.shoot(id, seed, Some(effect));
         let found = sets.diagnose(&real, &clean, 1);
-        // What may be a symptom of another cause is told as what it resembles.
+        // A finding that may be a symptom of another cause is reported by what it resembles.
         let resembles = &found["findings"][0]["alternatives"][0]["effect"];
         assert_eq!((names(&found), resembles), (vec![named], &Value::from(id)));
         let both = sets.shoot(&format!("{id}-both"), seed + 1, Some(effect));
@@ -150,7 +150,7 @@ fn two_recordings_of_nothing_but_noise_match() {
     }
 }
 
-/// One message: what, and what to do.
+/// Asserts a refusal with one message that contains `says`.
 fn refused(real: &Path, simulated: &Path, says: &[&str]) {
     let out = real.with_file_name("refused");
     let command = common::kinoise()

@@ -1,5 +1,4 @@
-//! `kinoise capture` from a recording that is played and a folder that is filled, its screen, and
-//! what can go wrong.
+//! `kinoise capture` from a played recording and a growing folder, its screen, and failures.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +14,7 @@ use crate::common;
 use crate::common::capture::{FRAMES, HELD_STILL, folder, frames_of, json, told};
 use crate::common::{BOARD, grid, kinoise, shots, write_depth};
 
-/// Three poses, small pictures, in order.
+/// A recording of three poses in order, with small images.
 fn small() -> &'static Path {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     MADE.get_or_init(|| {
@@ -97,7 +96,7 @@ fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
     }
 }
 
-/// A frame of the small recording, put into a folder as another program would.
+/// Puts frames of the small recording into a folder, as another program would.
 fn fill(to: &Path, frames: std::ops::Range<usize>) {
     let recording = open(small(), &Assumed::default()).expect("a recording");
     for (k, frame) in frames_of(&recording).iter().enumerate() {
@@ -155,7 +154,7 @@ fn interrupted_it_ends_in_order() {
     assert!(!output.join(".partial").exists());
 }
 
-/// A stream that stands still is given up; a file that is half written is waited for.
+/// Capture gives up when the folder stops growing.
 #[test]
 fn a_stream_that_stands_still_is_told() {
     let folder = folder();
@@ -167,7 +166,7 @@ fn a_stream_that_stands_still_is_told() {
     assert!(said.contains("no frame for 1 s"), "{said}");
 }
 
-/// A limit on the size of files is met as a full disk is: by a write that fails.
+/// A file size limit acts like a full disk: the write fails.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_ends_it_and_what_was_finished_stays() {
@@ -189,7 +188,7 @@ fn a_full_disk_ends_it_and_what_was_finished_stays() {
     assert_eq!(kept.views.len(), 1);
 }
 
-/// The folder's frames are all there, so the sensor stands still with one view on the disk.
+/// After the folder's last frame the first capture waits, with one view finished and the second begun.
 #[test]
 fn a_second_capture_into_the_same_recording_is_refused() {
     let folder = folder();
@@ -229,7 +228,7 @@ fn what_is_played_does_not_grow_and_what_is_left_out_is_told() {
     assert!(told(&done).contains("2 views are kept"), "{}", told(&done));
 }
 
-/// `script` (util-linux) gives it a terminal: what the keys do, and the terminal is as it was.
+/// Runs it in a terminal made by `script` (util-linux): the keys work and the terminal is restored.
 #[cfg(target_os = "linux")]
 #[test]
 fn on_a_terminal_keys_are_heeded_and_the_terminal_is_left_as_it_was() {

@@ -1,4 +1,4 @@
-//! `kinoise capture` from a Kinect: a dump by light through the C interface of Debian's fakenect,
+//! `kinoise capture` from a Kinect: a speckle-simulated dump through the C interface of Debian's fakenect,
 //! and a mock of libfreenect for what fakenect lacks.
 
 use std::fs;
@@ -15,7 +15,7 @@ use crate::common;
 use crate::common::capture::{FRAMES, HELD_STILL, HOLD, folder, frames_of, json, told};
 use crate::common::{BOARD, grid, kinoise, write_dump};
 
-/// A file of the package libfreenect0.5, or `None` with a line that says what to do.
+/// A file of the package libfreenect0.5; `None`, with a printed remedy, if it is not installed.
 fn installed(name: &str) -> Option<PathBuf> {
     let machines = fs::read_dir("/usr/lib").into_iter().flatten().flatten();
     let found = machines.map(|m| m.path().join(name)).find(|p| p.is_file());
@@ -29,7 +29,7 @@ fn installed(name: &str) -> Option<PathBuf> {
 
 const STAND_IN: &str = "fakenect/libfreenect.so.0.5";
 
-/// `./run test` installs the package wherever it can, so there nothing is skipped.
+/// `./run test` installs the package wherever it can; there no test may be skipped.
 #[test]
 fn the_stand_in_is_there_where_it_can_be() {
     if Path::new("/usr/bin/dpkg-query").exists() {
@@ -40,7 +40,7 @@ fn the_stand_in_is_there_where_it_can_be() {
     }
 }
 
-/// Nine views by light, 640 x 480 px as fakenect will have it, and the same as a dump: made once.
+/// Nine speckle-simulated views at fakenect's 640 x 480 px, and the same as a dump; made once.
 struct ByLight {
     recording: Recording,
     dump: PathBuf,
@@ -71,7 +71,7 @@ fn by_light() -> &'static ByLight {
         .1
 }
 
-/// The command on a dump; what the dump's sensor is comes as options.
+/// The capture command on a dump, with the dump's sensor given by options.
 fn from_dump(library: &Path, dump: &Path, output: &Path) -> assert_cmd::Command {
     let DepthCode::Disparity { offset, slope, .. } = by_light().recording.sensor.code else {
         panic!("by light there are raw words")
@@ -91,8 +91,8 @@ fn from_dump(library: &Path, dump: &Path, output: &Path) -> assert_cmd::Command 
     command
 }
 
-/// Frames come out as they went in, bit for bit, view by view; and the recording that was made is
-/// measured where the board stood and diagnosed.
+/// The captured frames equal the dumped ones bit for bit, view by view; the recording calibrates to the
+/// board's true distances and can be diagnosed.
 #[test]
 fn a_dump_by_light_is_captured_calibrated_and_diagnosed() {
     let Some(library) = installed(STAND_IN) else { return };
@@ -110,7 +110,7 @@ fn a_dump_by_light_is_captured_calibrated_and_diagnosed() {
         assert!(view.depth.windows(2).all(|w| w[1].timestamp > w[0].timestamp));
     }
     for (k, frames) in frames_of(&captured).chunks(FRAMES).enumerate() {
-        // The grid is in order, and so are the names. The view begins with the second still frame.
+        // The views are in grid order, and so are their names. A view begins with the second still frame.
         let from = k * HELD_STILL + HOLD - 1;
         assert!(frames == &shot[from..from + FRAMES], "{}", captured.views[k].name);
     }
@@ -123,7 +123,7 @@ fn a_dump_by_light_is_captured_calibrated_and_diagnosed() {
     let views = json(&calibrated)["views"].as_array().expect("views").clone();
     assert_eq!(views.len(), 9);
     for (view, z) in views.iter().zip([1.0, 1.0, 1.0, 1.5, 1.5, 1.5, 2.0, 2.0, 2.0]) {
-        // By light the depth is biased by some millimetres.
+        // The speckle simulation biases the depth by some millimetres.
         let measured = view["axis_distance_m"].as_f64().expect("a distance");
         assert!((measured - z).abs() < 0.01 * z, "{} {measured}", view["view"]);
     }
@@ -137,7 +137,7 @@ fn a_dump_by_light_is_captured_calibrated_and_diagnosed() {
     assert!(matches!(code, Some(0 | 1)), "{}", told(&diagnosed));
 }
 
-/// The dump ends in the middle of a view: as when the cable is pulled. The whole dump goes on.
+/// The dump ends in the middle of a view, as when the cable is pulled; capture resumes with the whole dump.
 #[test]
 fn an_unplugged_sensor_loses_nothing_that_was_finished_and_the_same_command_goes_on() {
     let Some(library) = installed(STAND_IN) else { return };
@@ -147,13 +147,13 @@ fn an_unplugged_sensor_loses_nothing_that_was_finished_and_the_same_command_goes
     let index = fs::read_to_string(dump.join("INDEX.txt")).expect("an index");
     let lines: Vec<&str> = index.lines().collect();
     let head = |n: usize| lines[..n].join("\n") + "\n";
-    // Two views and a half.
+    // Two and a half views.
     fs::write(dump.join("INDEX.txt"), head(2 * HELD_STILL + 3)).expect("written");
     let ended = from_dump(&library, &dump, &output).assert().code(2);
     assert!(told(&ended).contains("no more frames"), "{}", told(&ended));
     assert_eq!(json(&ended)["views"].as_array().map(Vec::len), Some(2));
     assert!(!output.join(".partial").exists());
-    // The next file is cut short: fakenect would read beyond its end.
+    // The next file is truncated: fakenect would read beyond its end.
     fs::write(dump.join("INDEX.txt"), &index).expect("written");
     let cut = dump.join(lines[4 * HELD_STILL + 1]);
     let bytes = fs::read(&cut).expect("read");
@@ -196,7 +196,7 @@ fn a_missing_library_a_foreign_one_and_a_missing_dump_say_what_to_do() {
     assert!(!output.exists(), "nothing was begun");
 }
 
-/// No machine that runs tests has a Kinect; where one has, there is nothing to test.
+/// Assumes that no Kinect is connected to the test machine.
 #[test]
 fn without_a_sensor_the_real_library_says_so() {
     let Some(library) = installed("libfreenect.so.0.5") else { return };
@@ -207,7 +207,7 @@ fn without_a_sensor_the_real_library_says_so() {
     assert!(said.contains("no Kinect is connected") || said.contains("USB"), "{said}");
 }
 
-/// The library of `tests/data/freenect_mock.c`, made once; `None` without a C compiler.
+/// The library built from `tests/data/freenect_mock.c`, once; `None` without a C compiler.
 fn mock() -> Option<&'static Path> {
     static MADE: OnceLock<Option<(tempfile::TempDir, PathBuf)>> = OnceLock::new();
     let made = MADE.get_or_init(|| {
@@ -236,7 +236,7 @@ fn from_mock(library: &Path, output: &Path, frames: &str, then: &str) -> assert_
     command
 }
 
-/// Serial, factory calibration and infrared, which the stand-in has not.
+/// Serial number, factory calibration and infrared, which fakenect lacks.
 #[test]
 fn a_units_own_serial_calibration_and_infrared_are_recorded() {
     let Some(library) = mock() else { return };
@@ -247,7 +247,7 @@ fn a_units_own_serial_calibration_and_infrared_are_recorded() {
     let recording = open(&output, &Assumed::default()).expect("a recording");
     assert_eq!(recording.sensor.serial.as_deref(), Some("A00366802050045A"));
     assert!((recording.sensor.camera.fx - 575.8).abs() < 0.05);
-    // libfreenect's own table has, for word 700, 10 (m 120/(7.5 - m) + 120) mm, m = -25.375 * .1042.
+    // libfreenect's own table gives 10 (m 120/(7.5 - m) + 120) mm with m = -25.375 * .1042 for word 700.
     let z = recording.sensor.code.metres(700).expect("a depth");
     assert!((z - 0.8872).abs() < 0.0001, "{z}");
     let view = &recording.views[0];
@@ -256,7 +256,7 @@ fn a_units_own_serial_calibration_and_infrared_are_recorded() {
     let infrared =
         kinoise::io::InfraredImage::read(&view.infrared[0].path, [640, 480]).expect("an image");
     assert_eq!((infrared.width, infrared.height), (640, 480));
-    // The 480 rows in the middle of 488, every row its number.
+    // The middle 480 of 488 rows; every row holds its number.
     assert_eq!((infrared.amplitude[0], infrared.amplitude[640 * 479]), (4, 483));
     let now = recording.views[0].depth[0].timestamp;
     assert!(now > 1.7e9, "seconds since 1970: {now}");

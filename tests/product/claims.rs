@@ -1,4 +1,4 @@
-//! What a model claims is held against the recording: too much of an effect is no match.
+//! What a model claims is tested against the recording: an effect that the recording lacks is a mismatch.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::common::kinoise;
 
-/// Before a wall, so that the target's edges tell something too.
+/// Boards in front of a wall, so that their edges are informative too.
 const VIEWS: [&str; 13] = [
     "simulate",
     "--shrink",
@@ -29,8 +29,8 @@ fn run(folder: &Path, arguments: &[&str]) {
     assert!(output.status.code().is_some_and(|code| code < 2), "{arguments:?}: {stderr}");
 }
 
-/// The verdict on a recording by the clean sensor's model with this effect, and whether it says that
-/// the model has too much.
+/// Diagnoses a recording with the clean sensor's model plus this effect. Returns the verdict, and whether a
+/// finding says that the model has too much.
 fn told(folder: &Path, recording: &str, id: &str, parameters: &Value) -> (String, bool) {
     let text = std::fs::read(folder.join("calibrated/model.json")).expect("a model");
     let mut model: Value = serde_json::from_slice(&text).expect("JSON");
@@ -45,7 +45,7 @@ fn told(folder: &Path, recording: &str, id: &str, parameters: &Value) -> (String
     (diagnosis["verdict"].as_str().expect("a word").into(), findings.iter().any(contradicted))
 }
 
-/// Each claim on the recording of a sensor without it, and on that of a sensor that has it.
+/// Tests each claim on a recording without the effect, and on one with it.
 #[test]
 fn a_model_that_has_too_much_of_an_effect_is_contradicted_and_a_true_one_is_not() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -79,7 +79,7 @@ fn a_model_that_has_too_much_of_an_effect_is_contradicted_and_a_true_one_is_not(
         let values = parameters.as_object().expect("an object").iter();
         let values: Vec<String> = values.map(|(name, v)| format!("{name}={v}")).collect();
         let effect = format!("{id}:{}", values.join(","));
-        // Where the effect leaves no plane to see there is nothing to compare.
+        // Where the effect leaves no visible plane there is nothing to compare.
         if *usable {
             let recording = format!("true{k}");
             run(at, &[&VIEWS[..], &[&recording, "--effect", &effect, "--seed", "5"]].concat());
@@ -88,8 +88,8 @@ fn a_model_that_has_too_much_of_an_effect_is_contradicted_and_a_true_one_is_not(
     }
 }
 
-/// On few small views, where no search finds what they have in common: noise that the model makes far too
-/// small or too large, and errors of many times the noise.
+/// On few small views, too few for the search: a sigma far too small or too large, and errors of many times
+/// the noise.
 #[test]
 fn a_model_that_is_far_off_is_no_match() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -1,10 +1,10 @@
-//! Clocks that disagree: of depth and colour in a film, and of a film and its ground truth.
+//! Clock offsets: between depth and colour in a film, and between a film and its ground truth.
 
 use crate::common;
 use crate::map::kinoise;
 
-/// The depth stamps of freiburg1_rpy lag 25 to 30 ms behind the motion capture: most of the rotation's
-/// error is not the mapper's.
+/// The depth stamps of freiburg1_rpy lag the motion capture by 25 to 30 ms: most of the rotation error is
+/// not the mapper's.
 #[test]
 fn the_clock_of_freiburg1_rpy_is_found() {
     let Some(film) = common::data("tum_fr1_rpy_a") else { return };
@@ -32,7 +32,7 @@ fn the_clock_of_freiburg1_rpy_is_found() {
     assert!(degrees(&plain) > 3.0 && degrees(&set) < 2.4, "{plain}\n{set}");
 }
 
-/// A camera that nods and shakes; the depth images' stamps run ahead by 12 ms or not at all.
+/// A camera that nods and shakes; the depth images are stamped 12 ms late, or not at all late.
 #[cfg(feature = "opencv")]
 #[test]
 fn clocks_of_depth_and_colour_that_disagree_are_told() {
@@ -65,7 +65,7 @@ fn clocks_of_depth_and_colour_that_disagree_are_told() {
         std::fs::write(folder.join("depth.txt"), shifted.collect::<String>()).unwrap();
         let mapped = mapped(&open(&folder, &Assumed::default()).unwrap(), &options);
         let offset = mapped.clock_offset().unwrap();
-        // Four standard errors: a chance of 6e-5.
+        // Four standard errors: false alarm probability 6e-5.
         let off = (offset.seconds - late_s).abs() / offset.std_error_s;
         assert!(off < 4.0 && offset.std_error_s < 0.003, "{late_s}: {offset:?}");
         let told = mapped.remarks.iter().any(|r| r.contains("ms late beside the colour images"));

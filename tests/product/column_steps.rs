@@ -1,4 +1,4 @@
-//! The steps of two real Kinects' columns, held against the raw values to their left and right.
+//! The column steps of two real Kinects, compared with the raw values to their left and right.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::common;
 const WIDTH: usize = 640;
 const NONE: u16 = 2047;
 
-/// Raw images below a folder.
+/// The raw images below a folder.
 fn images(root: &Path) -> Vec<Vec<u16>> {
     let png = |path: &Path| path.extension().is_some_and(|e| e == "png");
     let files = common::tree(root).into_iter().filter(|(path, _)| png(path));
@@ -17,8 +17,8 @@ fn images(root: &Path) -> Vec<Vec<u16>> {
     files.map(|(_, bytes)| raw(&bytes).into_raw()).collect()
 }
 
-/// Raw values that a column lies above the one before it, where that is less than three: the mean over the rows,
-/// over many of which both have one.
+/// Mean rise of raw values from the previous column, over rows where both are valid and it is below three;
+/// `None` with 100 such rows or fewer.
 fn rise(raw: &[u16], column: usize) -> Option<f64> {
     let pairs = raw.chunks_exact(WIDTH).map(|row| [row[column - 1], row[column]]);
     let seen = pairs.filter(|pair| !pair.contains(&NONE));
@@ -29,8 +29,8 @@ fn rise(raw: &[u16], column: usize) -> Option<f64> {
     (rises.len() > 100).then(|| rises.iter().sum::<f64>() / rises.len() as f64)
 }
 
-/// Images that show steps, and how many of the steps (and of the columns next to one) rise by more than half a raw
-/// value.
+/// Number of images with steps; then, for step columns and for the columns beside them, how many rise by more
+/// than half a raw value in the step's direction, and of how many.
 fn seen(images: &[Vec<u16>]) -> (usize, [usize; 2], [usize; 2]) {
     let (mut shown, mut steps, mut beside) = (0, [0; 2], [0; 2]);
     for raw in images {
@@ -56,7 +56,7 @@ fn seen(images: &[Vec<u16>]) -> (usize, [usize; 2], [usize; 2]) {
 
 #[test]
 fn each_image_of_a_real_kinect_shows_its_own() {
-    // The second unit's disparities were turned into mm and back: not every step is a whole one.
+    // The second unit's disparities were converted to mm and back: not every step is a whole one.
     let units = [("herrera-kinect-v1/recording", 39, 0.97), ("kinect-v1-second-unit", 33, 0.9)];
     for (folder, of, share) in units {
         let Some(folder) = common::data(folder) else { continue };
@@ -68,7 +68,7 @@ fn each_image_of_a_real_kinect_shows_its_own() {
         );
         assert_eq!(shown, of);
         assert!(right as f64 > share * steps as f64, "{right} of {steps}");
-        // Of a steep board every column rises.
+        // On a steep board every column rises.
         assert!(20 * wrong < beside, "{wrong} of {beside}");
     }
 }

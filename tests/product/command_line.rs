@@ -1,4 +1,4 @@
-//! What the command line says beside its results: help, typos, the next step, findings as commands.
+//! Messages of the command line: help, typos, the next step, findings as commands.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn folder() -> tempfile::TempDir {
     tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder")
 }
 
-/// Run a printed command as a shell does.
+/// Runs a printed command in a shell.
 fn run_line(line: &str) -> Output {
     let rest = line.trim().strip_prefix("kinoise ").expect("a command of kinoise");
     let line = format!("\"$KINOISE\" {rest}");
@@ -61,12 +61,12 @@ fn a_typo_is_answered_from_the_command_it_belongs_to() {
     }
 }
 
-/// From the recording to the corrected one by copying the last line of each command. The board is
-/// bent, so that the finding has a parameter that the diagnosis measures elsewhere: its span.
+/// Runs the next step that each command prints, starting with a simulation. The board is bent: the span in
+/// the printed effect is a parameter that the diagnosis measures elsewhere.
 #[test]
 fn each_command_names_the_next_and_each_finding_its_simulation() {
     let folder = folder();
-    // A space and a quote, which a shell must not see.
+    // A space and a quote, which must be quoted for the shell.
     let root = folder.path().join("it's here");
     let at = |name: &str| root.join(name);
     let shot = run([
@@ -95,13 +95,13 @@ fn each_command_names_the_next_and_each_finding_its_simulation() {
     let again = run_line(bow);
     assert!(again.status.success(), "{}", stderr(&again));
     assert!(at("bent-noise-diagnosis-target-bow/recording.json").is_file(), "{bow}");
-    // A bent board is no bias of the sensor: nothing to correct, but a twin to look at.
+    // A bent board is no bias of the sensor: the next step is a simulated twin, not a correction.
     let next = next_of(&diagnosed);
     assert!(next.contains("simulate") && run_line(&next).status.success(), "{next}");
 }
 
-/// A plain folder needs its options again in every command that reads it, on the terminal and on the
-/// page; what is corrected needs none.
+/// Every command that reads a plain folder repeats its options, on the terminal and on the page; the
+/// corrected recording needs none.
 #[test]
 fn a_plain_folder_is_read_alike_by_every_next_command() {
     let folder = folder();
@@ -130,7 +130,7 @@ fn a_plain_folder_is_read_alike_by_every_next_command() {
     let bias = text.lines().find(|l| l.contains("--effect radial-disparity-bias:")).expect(&text);
     let again = run_line(bias);
     assert!(again.status.success(), "{bias}: {}", stderr(&again));
-    // Held against its twin, which describes itself.
+    // Compared with its twin, which describes itself.
     let against = run_line(&next_of(&again));
     assert!(matches!(against.status.code(), Some(0 | 1)), "{}", stderr(&against));
 
@@ -188,7 +188,7 @@ fn a_script_may_ask_for_no_exit_code_of_a_finding() {
     assert_eq!((code(&[], "a"), code(&["--exit-zero"], "b")), (Some(1), Some(0)));
 }
 
-/// The promise comes before the diagnosis and holds what is opened after it.
+/// The hash comes before the diagnosis and matches the text opened after it.
 #[test]
 fn the_demo_keeps_its_promise() {
     let folder = folder();

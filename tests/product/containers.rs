@@ -1,5 +1,5 @@
-//! One film in every container, written by other people's libraries (tests/tools/make_containers.py):
-//! each reader gives the frames and the model of the same film in a folder of PNGs.
+//! One film in every container, written by third-party libraries (tests/tools/make_containers.py): each
+//! reader gives the same frames and the same model as the film in a folder of PNGs.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -18,16 +18,16 @@ use serde_json::{Value, json};
 use crate::common::{kinoise, write_depth};
 
 const SIZE: (usize, usize) = (32, 24);
-/// Frames of a view.
+/// Frames per view.
 const STILL: usize = 10;
 const MILLIMETRES: DepthCode = DepthCode::Metric { units_per_metre: 1000.0, invalid: 0 };
 
-/// A file of tests/data/containers.
+/// Path of a file in tests/data/containers.
 fn container(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/containers").join(name)
 }
 
-/// The film as make_containers.py makes it, mm.
+/// The film as made by make_containers.py, mm.
 fn film() -> Vec<Frame> {
     let views = [(800, 0, 0), (1200, 6000, -2000), (1700, -5000, 3000), (2300, 3000, 0)];
     let mut state = 12_345i64;
@@ -70,7 +70,7 @@ fn sensor() -> Sensor {
     }
 }
 
-/// The film in the TUM layout, described.
+/// The film in the TUM layout, with a description.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut list = String::new();
@@ -94,13 +94,13 @@ fn frames(recording: &Recording) -> Vec<(f64, Frame)> {
     recording.views.iter().flat_map(|v| &v.depth).map(read).collect()
 }
 
-/// The whole film of a topic.
+/// The whole film of a topic, not cut into views.
 fn uncut(name: &str, topic: &str) -> Recording {
     let assumed = Assumed { topic: Some(topic.into()), ..Assumed::default() };
     open_uncut(&container(name), &assumed).unwrap_or_else(|e| panic!("{name}, {topic}: {e}"))
 }
 
-/// model.json, without where it came from.
+/// The content of model.json without its provenance.
 fn model(mut recording: Recording) -> Value {
     recording.sensor.name = sensor().name;
     let options = CalibrateOptions::default();
@@ -111,11 +111,11 @@ fn model(mut recording: Recording) -> Value {
     value
 }
 
-/// All but the one behind a feature.
+/// All containers of the film; .db3 needs the feature.
 fn films() -> Vec<&'static str> {
     let mut films = vec!["film.bag", "film.mcap", "film.npz"];
     if cfg!(feature = "db3") {
-        // The folder that rosbag2 makes, and the file in it.
+        // The folder made by rosbag2, and the file in it.
         films.extend(["film", "film/film.db3"]);
     }
     films
@@ -142,7 +142,7 @@ fn every_container_gives_the_frames_and_the_model_of_the_folder() {
 fn bags_tell_the_temperature_of_a_view() {
     let recording = open(&container("film.bag"), &Assumed::default()).expect("a bag");
     let celsius: Vec<f64> = recording.views.iter().filter_map(|v| v.notes.temperature_c).collect();
-    // One reading in each view, at its fifth frame.
+    // One reading per view, at its fifth frame.
     assert_eq!(celsius, [30.4, 31.4, 32.4, 33.4]);
 }
 
@@ -166,7 +166,7 @@ fn a_bag_is_mapped_and_corrected_as_the_folder_is() {
     model.effects = vec![bowl];
     let out = tempfile::tempdir().expect("a temporary folder");
     let assumed = Assumed { baseline_m: Some(0.075), ..Assumed::default() };
-    // The folder says no baseline, and an option beside its description is refused.
+    // The folder has no baseline, and an option that adds to a description is refused.
     write_recording_file(folder.path(), &sensor).expect("written");
     let corrected = |path: &Path, name: &str, assumed: &Assumed| {
         let output = out.path().join(name);
@@ -195,7 +195,7 @@ fn every_encoding_of_depth_is_understood() {
             let frames: Vec<Frame> = frames(&recording).into_iter().map(|(_, f)| f).collect();
             assert!(frames[..] == film[..count], "{bag}, {topic}");
         }
-        // Inverse depths in steps of 1/10100 a metre, cut off: two millimetres in a hundred.
+        // Inverse depths are truncated to steps of 1/10100 per metre; rounding to words of 0.1 mm adds to it.
         let recording = uncut(bag, "/inverse/image/compressedDepth");
         let table = recording.sensor.code.table();
         let read = frames(&recording);
@@ -291,7 +291,7 @@ fn the_command_line_reads_a_bag() {
 
 // ---- damage -----------------------------------------------------------------------------------
 
-/// Files of every kind, with what their topic needs.
+/// Files of every kind, with the options that their topic needs.
 fn victims() -> Vec<(&'static str, Assumed)> {
     let topic = |name: &str| Assumed { topic: Some(name.into()), ..Assumed::default() };
     let camera = Assumed { intrinsics: Some([29.0, 29.25, 15.5, 11.75]), ..Assumed::default() };
@@ -313,7 +313,7 @@ fn victims() -> Vec<(&'static str, Assumed)> {
     victims
 }
 
-/// A damaged copy, under its own name.
+/// A damaged copy under its own name.
 fn spoilt(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(Path::new(name).file_name().expect("a name"));
@@ -341,7 +341,7 @@ fn a_file_that_is_cut_is_refused_by_name_and_with_what_to_do() {
     }
 }
 
-/// Whatever a byte becomes, there is a film or an error.
+/// Whatever a byte becomes, the result is a film or an error.
 #[test]
 fn no_garbage_ends_in_a_panic() {
     const TRIES: u64 = 120;
@@ -357,7 +357,7 @@ fn no_garbage_ends_in_a_panic() {
         let mut refused = 0;
         for k in 0..TRIES {
             let mut bytes = whole.clone();
-            // Mostly at the ends, where the headers and the indices are.
+            // Mostly near the ends, where the headers and indices are.
             let reach = if k % 3 == 0 { bytes.len() } else { bytes.len().min(400) };
             for _ in 0..1 + k % 4 {
                 let at = random() as usize % reach;
@@ -380,7 +380,7 @@ fn no_garbage_ends_in_a_panic() {
     }
 }
 
-/// `new` in the place of the `nth` `old`.
+/// `bytes` with the `nth` occurrence of `old` replaced by `new`.
 fn replaced(bytes: &[u8], old: &[u8], nth: usize, new: &[u8]) -> Vec<u8> {
     let found = bytes.windows(old.len()).enumerate().filter(|(_, w)| *w == old).nth(nth);
     let (at, _) = found.unwrap_or_else(|| panic!("{old:?} is not in the file"));
@@ -408,7 +408,7 @@ fn a_bag_without_an_index_is_told_to_be_mended() {
 fn lengths_that_lie_are_not_believed() {
     let none = Assumed::default();
     let whole = fs::read(container("realsense.bag")).expect("a bag");
-    // The pixels of the first image: 32 x 24 x 2 bytes, announced behind their row's 64.
+    // The pixels of the first image: 32 x 24 x 2 bytes; the count follows the row length of 64.
     let announced = |n: u32| [64u32.to_le_bytes(), n.to_le_bytes()].concat();
     for lie in [u32::MAX, 1537, 100] {
         let bytes = replaced(&whole, &announced(1536), 0, &announced(lie));
@@ -424,7 +424,7 @@ fn lengths_that_lie_are_not_believed() {
 
     let hundred_gb = 100_000_000_000u64.to_le_bytes();
     let mcap = fs::read(container("unchunked.mcap")).expect("an MCAP");
-    // The first record behind the magic.
+    // The length of the first record after the magic.
     let mut bytes = mcap.clone();
     bytes[9..17].copy_from_slice(&hundred_gb);
     assert!(refused("unchunked.mcap", &bytes, &none).contains("mcap recover"));
@@ -441,11 +441,11 @@ fn lengths_that_lie_are_not_believed() {
     assert!(refused("words.npy", &bytes, &camera).contains("needs more than"));
 }
 
-/// Room was made for as much text as a record claims.
+/// The claimed length of a text must not decide how much memory is allocated.
 #[test]
 fn the_text_of_an_mcap_record_is_as_long_as_the_record() {
     let whole = fs::read(container("unchunked.mcap")).expect("an MCAP");
-    // Behind the header's record: a schema's kind and length, its number, its name's length.
+    // After the header's record: a schema's kind and length, its number, its name's length.
     let schema = 8 + 9 + u64::from_le_bytes(whole[9..17].try_into().expect("eight")) as usize;
     assert_eq!(whole[schema], 3, "a schema follows the header");
     let mut bytes = whole.clone();
@@ -454,7 +454,7 @@ fn the_text_of_an_mcap_record_is_as_long_as_the_record() {
     assert!(said.contains("4294967295 bytes begins where only"), "{said}");
 }
 
-/// A chunk that is listed a million times is gone through a million times.
+/// A chunk listed a million times would be read a million times.
 #[test]
 fn a_bag_that_lists_a_chunk_twice_is_refused() {
     let mut bytes = fs::read(container("film.bag")).expect("a bag");
@@ -462,7 +462,7 @@ fn a_bag_that_lists_a_chunk_twice_is_refused() {
     let behind = |field: &[u8]| {
         bytes.windows(field.len()).position(|w| w == field).expect("the field") + field.len()
     };
-    // A record is a header and data, each behind its length; what describes the chunk is the last.
+    // A record is a header and data, each preceded by its length; the last one describes the chunk.
     let (counted, mut last, mut at) = (behind(b"chunk_count="), 0, word(behind(b"index_pos=")));
     while at < bytes.len() {
         last = at;
@@ -475,7 +475,7 @@ fn a_bag_that_lists_a_chunk_twice_is_refused() {
     assert!(said.contains("lists a chunk twice"), "{said}");
 }
 
-/// A view may be a query that never ends.
+/// A database view may be a query that never ends.
 #[cfg(feature = "db3")]
 #[test]
 fn a_db3_whose_tables_are_none_is_refused() {

@@ -1,5 +1,5 @@
-//! Geometry with nothing to hold on to: points on a line, one pixel, a plane seen edge on, no depth. The
-//! answer is an error, nothing, or a number.
+//! Degenerate geometry: points on a line, one pixel, a plane seen edge on, no depth. The answer is an error,
+//! `None`, or a finite number.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fs;
@@ -19,7 +19,7 @@ use proptest::prelude::*;
 
 use crate::common::kinoise;
 
-/// Where a plane is edge on, or has no distance, it has no depth: never a wrong one.
+/// A plane seen edge on, or without a distance, has no depth: never a wrong one.
 #[test]
 fn a_plane_at_the_pole_is_finite_or_says_that_it_is_not() {
     for theta in [0.0, FRAC_PI_2 - 1e-12, FRAC_PI_2, FRAC_PI_2 + 1e-9, PI] {
@@ -71,7 +71,7 @@ fn pose(stamp: f64, at: [f64; 3]) -> Pose {
     Pose { stamp, world_from_camera: Isometry3::translation(at[0], at[1], at[2]) }
 }
 
-/// A path along a line leaves the turn about it open; one that stands leaves all.
+/// A path along a line leaves the rotation about it undetermined; a standing one leaves all of it.
 #[test]
 fn trajectories_on_a_line_and_in_one_place_have_errors() {
     for step in [[0.0; 3], [0.1, 0.0, 0.0], [1e-200, 0.0, 0.0], [1e7, 1e7, 0.0]] {
@@ -83,7 +83,7 @@ fn trajectories_on_a_line_and_in_one_place_have_errors() {
     }
 }
 
-/// Kilometres along and centimetres across: the turn about the way is as sure as the rest.
+/// Kilometres along and centimetres across: the rotation about the path is still determined.
 #[test]
 fn a_long_straight_path_beside_itself_has_no_error() {
     let elsewhere = Isometry3::new(Vector3::new(3.0, -2.0, 1.0), Vector3::new(0.5, 1.0, -2.0));
@@ -98,7 +98,7 @@ fn a_long_straight_path_beside_itself_has_no_error() {
     }
 }
 
-/// A described recording of one view whose frames are all `frame`.
+/// Writes a described recording of one view with two identical frames.
 fn recording(root: &Path, sensor: &Sensor, frame: &Frame) {
     fs::create_dir_all(root.join("a")).expect("made");
     fs::write(root.join("a/0.png"), encode_png16(frame).expect("encoded")).expect("written");
@@ -146,7 +146,7 @@ fn images_of_a_pixel_a_row_or_nothing_are_refused_by_every_command() {
     }
 }
 
-/// A wall without noise: sigma is what rounding leaves, and no division by it goes wrong.
+/// A wall without noise: sigma is the rounding error, and dividing by it must not fail.
 #[test]
 fn a_wall_without_any_noise_is_measured_or_refused() {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
@@ -175,7 +175,7 @@ fn coordinate() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Points on a line, in a plane, or all the same: a motion that is one, or none.
+    /// Collinear, coplanar or identical points: a rigid motion, or `None`.
     #[test]
     fn alignments_are_motions(
         along in prop::array::uniform3(coordinate()), steps in prop::collection::vec(coordinate(), 0..12),
@@ -189,7 +189,7 @@ proptest! {
         }
     }
 
-    /// A plane of collinear points is none, or one.
+    /// Collinear points have a finite plane or `None`.
     #[test]
     fn planes_of_collinear_points(
         along in prop::array::uniform3(-2.0f32..2.0), from in prop::array::uniform3(0.0f32..2.0), n in 0usize..60, spread in 0.0f32..2.0,
@@ -216,7 +216,7 @@ proptest! {
         prop_assert!(fit.is_none_or(|f| f.plane.is_finite() && f.scale.is_finite()), "{:?}", fit);
     }
 
-    /// Corners in one place or on a line enclose nothing, and ask for no square root.
+    /// Corners at one place or on a line enclose nothing, and need no square root.
     #[test]
     fn regions_of_any_corners(corners in prop::collection::vec([coordinate(), coordinate()], 3..8), u in coordinate(), v in coordinate()) {
         let flat: Vec<[f64; 2]> = corners.iter().map(|c| [c[0], 1.0]).collect();
@@ -224,7 +224,7 @@ proptest! {
         let _ = Region::Polygon(corners).contains(u, v);
     }
 
-    /// Whatever the raw value: nothing, or a depth that goes back to it.
+    /// Any raw value has a positive finite depth or none, and the table agrees.
     #[test]
     fn raw_values_of_any_code(offset in coordinate(), slope in coordinate(), raw in any::<u16>()) {
         let code = DepthCode::Disparity { offset, slope, invalid: 2047 };
@@ -232,7 +232,7 @@ proptest! {
         prop_assert!(code.table().metres(raw).is_nan() == code.metres(raw).is_none());
     }
 
-    /// Rays of every pixel of every camera without a fault, and its image again.
+    /// The ray of any pixel of any camera without a fault projects back to it.
     #[test]
     fn rays_of_any_camera(
         width in 1usize..80, height in 1usize..60, f in 1.0f64..500.0, k in prop::array::uniform5(-0.5f64..0.5), u in 0.0f64..1.0, v in 0.0f64..1.0,
@@ -247,7 +247,7 @@ proptest! {
     }
 }
 
-/// Models read from a file know their own edges.
+/// A model whose domain is a single point is valid, also when read from a file.
 #[test]
 fn a_model_of_one_place_is_a_model() {
     let mut model = NoiseModel::paper();

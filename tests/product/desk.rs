@@ -1,4 +1,4 @@
-//! A folder to work in with the good recording, and the program run there.
+//! A working folder with the good recording, in which tests run the program.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,14 +17,14 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// With the good recording in `rec`.
+    /// A folder with the good recording in `rec`.
     pub fn new() -> Self {
         let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
         copy_tree(good(), &folder.path().join("rec"));
         Desk { folder }
     }
 
-    /// With a short film and Eq. 1 too.
+    /// A folder that also has a short film and a model of Eq. 1.
     pub fn furnished() -> Self {
         let desk = Desk::new();
         desk.film("film", 4);
@@ -40,7 +40,7 @@ impl Desk {
         self.folder.path().join(name)
     }
 
-    /// The depth images of a film, in time order.
+    /// Depth images of a film, in time order.
     pub fn images(&self, film: &str) -> Vec<PathBuf> {
         let folder = fs::read_dir(self.at(film).join("depth")).expect("images");
         let mut images: Vec<PathBuf> = folder.map(|e| e.expect("one").path()).collect();
@@ -54,7 +54,7 @@ impl Desk {
         fs::write(path, bytes).expect("written");
     }
 
-    /// The good recording's description with one change.
+    /// Writes the good recording's description with a change.
     pub fn describe(&self, change: impl FnOnce(&mut Value)) {
         let text = fs::read_to_string(good().join("recording.json")).expect("text");
         let mut value: Value = serde_json::from_str(&text).expect("JSON");
@@ -62,7 +62,7 @@ impl Desk {
         self.put("rec/recording.json", format!("{value:#}"));
     }
 
-    /// Run in the folder; what hangs is stopped and has no exit code.
+    /// Runs a command in the folder; a run that hangs is stopped and has no exit code.
     pub fn run(&self, line: &str) -> Output {
         let words = line.split_whitespace();
         kinoise()
@@ -94,7 +94,7 @@ impl Desk {
         stderr
     }
 
-    /// A film of the office.
+    /// Writes a film of the office.
     pub fn film(&self, name: &str, frames: usize) {
         let film = Film {
             sensor: Film::kinect(4),
@@ -106,7 +106,7 @@ impl Desk {
         film.write(&self.at(name), &|_, _| ()).expect("written");
     }
 
-    /// Eq. 1 as model.json with a change.
+    /// Writes Eq. 1 as a model file with a change.
     pub fn model(&self, name: &str, change: impl FnOnce(&mut Value)) {
         let text = NoiseModel::paper().to_json().expect("a model");
         let mut model: Value = serde_json::from_str(&text).expect("JSON");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{copy_tree, good, kinoise, tree, write_depth};
 
-/// Run with `-o`/the last argument as the output folder; its files and stdout.
+/// Runs the program with the output folder as the last argument; returns its files and stdout.
 fn run(arguments: &[&str], threads: &str, seed: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out");
@@ -47,7 +47,7 @@ fn calibrate_gives_the_same_bytes_on_one_thread_and_two() {
     let model = String::from_utf8_lossy(named(&one, "model.json"));
     assert!(model.contains("2023-11-14T22:13:20Z"), "SOURCE_DATE_EPOCH is the time: {model}");
     assert!(model.contains("\"seed\": 11"));
-    // The seed decides only which hypotheses are tried: the surface hardly moves, its record does.
+    // The seed only decides which hypotheses are tried: the surface hardly moves, but the seed is recorded.
     let other = run(&arguments, "2", "12");
     assert_ne!(named(&one, "model.json"), named(&other, "model.json"));
 }
@@ -67,7 +67,7 @@ fn simulate_gives_the_same_bytes_on_one_thread_and_two_and_others_for_another_se
     assert_eq!(named(&one, "recording.json"), named(&other, "recording.json"));
 }
 
-/// Every byte of the road from simulation to model, twice.
+/// Simulation and calibration twice give the same bytes.
 #[test]
 fn a_model_made_from_a_simulation_of_itself_repeats() {
     let calibrated = || {
@@ -91,7 +91,7 @@ fn a_model_made_from_a_simulation_of_itself_repeats() {
     assert_eq!(calibrated(), calibrated());
 }
 
-/// calib_data/README.md says how the bundled recording was made; this is that command.
+/// Repeats the command by which the bundled recording was made (calib_data/README.md).
 #[test]
 fn the_bundled_recording_is_what_its_command_makes() {
     let bundled = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/eq1-paper-grid");
@@ -106,14 +106,14 @@ fn the_bundled_recording_is_what_its_command_makes() {
     same(&tree(&bundled), &tree(&made));
 }
 
-/// A sensor that sees everything the other way round is no noisier.
+/// A mirrored or rotated sensor is no noisier.
 #[test]
 fn a_mirrored_or_rotated_recording_has_the_same_noise() {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
     let fitted = |turn: fn(usize, usize) -> usize| {
         let root = folder.path().join("rec");
         copy_tree(good(), &root);
-        // The principal point is in the middle: it stays.
+        // The principal point is central, so it does not move.
         for (file, _) in
             tree(&root).iter().filter(|(f, _)| f.extension().is_some_and(|e| e == "png"))
         {

@@ -1,4 +1,4 @@
-//! What a correction makes of distances: references, if there are any, and planes alone, tell.
+//! How a correction changes distances, judged by references, if any, and by planes alone.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::common::kinoise;
 
-/// Frontal and tilted views, of a board that reaches beyond the picture in the nearest of them.
+/// Frontal and tilted views of a board that reaches beyond the image in the nearest of them.
 const VIEWS: [&str; 14] = [
     "--shrink",
     "4",
@@ -39,7 +39,7 @@ fn findings(folder: &Path) -> Vec<Value> {
     findings.as_array().expect("a list").iter().filter(|f| told(f)).cloned().collect()
 }
 
-/// Root mean square of measured less reference distance, m.
+/// Root mean square of measured minus reference distance, m.
 fn off(folder: &Path, recording: &str) -> f64 {
     run(folder, &["calibrate", recording, "-o", "measured", "--force", "-q"]);
     let path = folder.join("measured/measurements.csv");
@@ -67,8 +67,7 @@ fn diagnosed(seed: &str, effects: &[&str]) -> (tempfile::TempDir, Vec<Value>) {
     (folder, found)
 }
 
-/// A bowl's constant is nothing that planes could tell. References do, so that a corrected recording
-/// agrees with them.
+/// Planes cannot determine a bowl's constant. References can, so that a corrected recording agrees with them.
 #[test]
 fn a_corrected_bowl_leaves_references_where_they_are() {
     let (folder, found) = diagnosed("5", &["radial-disparity-bias:k_px=0.2"]);
@@ -80,7 +79,7 @@ fn a_corrected_bowl_leaves_references_where_they_are() {
     assert!(after < 0.002, "{before} m before, {after} m after");
 }
 
-/// The same beside an error of the scale, which a bowl's open constant does not hide.
+/// The same together with a scale error, which the bowl's undetermined constant must not hide.
 #[test]
 fn a_scale_is_told_beside_a_bowl() {
     let effects = ["radial-disparity-bias:k_px=0.2", "depth-scale:scale=1.01"];
@@ -93,7 +92,7 @@ fn a_scale_is_told_beside_a_bowl() {
     assert!(before > 0.008 && after < 0.002, "{before} m before, {after} m after");
 }
 
-/// The plane of a bent board is not where its middle was measured: that is no law of the distance.
+/// The plane of a bent board is off its measured centre: that is no law of the distance.
 #[test]
 fn a_bent_board_is_no_wrong_scale() {
     let (_folder, found) = diagnosed("7", &["target-bow"]);
@@ -103,7 +102,7 @@ fn a_bent_board_is_no_wrong_scale() {
     }
 }
 
-/// Nothing is lost where the board's edge leaves the picture at a slant.
+/// No loss of pixels is found where the board's edge leaves the image at an angle.
 #[test]
 fn a_board_beyond_the_picture_loses_nothing() {
     for seed in ["8", "9", "10"] {

@@ -1,4 +1,4 @@
-//! The other exported files, each read by those who read them.
+//! The other exported files, each read by its intended reader.
 
 use std::path::Path;
 use std::process::Command;
@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::export_programs::{model, python_with, run};
 use crate::common::kinoise;
 
-/// A bowl that grows with the square of the disparity, and its noise.
+/// A bias bowl that grows with the square of the disparity, and noise effects.
 fn bowl() -> NoiseModel {
     let basis = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::DisparitySquared);
     let shape = vec![Term::bias(basis, vec![0.4])];
@@ -47,7 +47,7 @@ fn written(model: &NoiseModel, format: ExportFormat, name: &str) -> Written {
     Written { folder, notes: exported.notes.join("\n") }
 }
 
-/// What Python makes of a file, as JSON.
+/// Runs a Python program on a file and returns the JSON that it prints.
 fn asked(python: &str, folder: &Path, program: &str) -> Value {
     let text = run(Command::new(python).args(["-c", program]).current_dir(folder));
     serde_json::from_str(&text).expect("JSON")
@@ -58,7 +58,7 @@ fn near(found: &Value, truth: f64, tolerance: f64) {
     assert!((found - truth).abs() <= tolerance * truth.abs(), "{found}, not {truth}");
 }
 
-/// The correction of pixel (u, v) of a picture of one depth, m.
+/// Corrected depth of pixel (u, v) in an image of constant depth, m.
 fn corrected(model: &NoiseModel, depth: f64, u: usize, v: usize) -> f64 {
     corrected_picture(model, depth)[v * 640 + u]
 }
@@ -185,7 +185,7 @@ print(json.dumps({'type': prim.GetTypeName(), 'schemas': prim.GetPrimTypeInfo().
     assert_eq!(found["type"], "RenderProduct");
     assert_eq!(found["schemas"], json!(["OmniSensorDepthSensorSingleViewAPI"]));
     assert_eq!(found["enabled"], true);
-    // USD's floats are single.
+    // USD's floats have single precision.
     for (name, truth) in [
         ("baselineMM", 75.0),
         ("focalLengthPixel", 580.0),
@@ -199,14 +199,14 @@ print(json.dumps({'type': prim.GetTypeName(), 'schemas': prim.GetPrimTypeInfo().
         near(&found[name], truth, 1e-7);
     }
     let sigma_px = |z: f64| model.sigma.sigma(z, 0.0) * 43.5 / (z * z);
-    // With the steps' own noise it is within what the model has over the range.
+    // Together with the steps' own noise it lies within the model's noise over the range.
     let found = found["noiseSigma"].as_f64().expect("a number").hypot(0.125 / 12f64.sqrt());
     let sizes = [1.0, 1.5, 2.0, 3.0, 4.0].map(sigma_px);
     let within = sizes.iter().any(|s| *s < found) && sizes.iter().any(|s| *s > found);
     assert!(within, "{found} {sizes:?}");
 }
 
-/// CLAMS is not installed anywhere: its reader's steps, once more.
+/// CLAMS is not available to the test: the steps of its reader are repeated here.
 #[test]
 fn clams_finds_the_bias() {
     let Some(python) = python_with("struct") else { return };
@@ -243,13 +243,13 @@ def undistort(u, v, z):
 print(json.dumps([[width, height, bw, bh, nx, ny]] + [undistort(4, 3, z) for z in (1.0, 1.7, 2.53, 3.9)]))");
     assert_eq!(found[0], json!([640, 480, 8, 6, 80, 80]));
     for (k, depth) in [1.0, 1.7, 2.53, 3.9].into_iter().enumerate() {
-        // Half a block off the middle of a block in the corner, and between bins of 0.2 m.
+        // Half a block off the middle of a corner block, and between the bins of 0.2 m.
         near(&found[1 + k], corrected(&model, depth, 4, 3), 2e-4);
     }
     assert!(file.notes.contains("the bias alone"), "{}", file.notes);
 }
 
-/// As Open3D's own comment has it: np.loadtxt(fname, comments='%', skiprows=5).
+/// Reads it as Open3D's own comment says: np.loadtxt(fname, comments='%', skiprows=5).
 #[test]
 fn open3d_finds_the_bias() {
     let Some(python) = python_with("json") else { return };

@@ -1,4 +1,4 @@
-//! The exported Python file and C header against the library itself.
+//! The exported Python file and C header, compared with the library itself.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use crate::common::truth;
 
-/// An interpreter with numpy and `module`, or a line that says that there is none.
+/// A Python interpreter with numpy and `module`; `None`, with a printed reason, if there is none.
 pub fn python_with(module: &str) -> Option<String> {
     let python = std::env::var("KINOISE_PYTHON").unwrap_or("python3".into());
     let check = Command::new(&python).args(["-c", &format!("import numpy, {module}")]).output();
@@ -28,7 +28,7 @@ pub fn python_with(module: &str) -> Option<String> {
     None
 }
 
-/// What a program prints; a panic with its complaint where it fails.
+/// Runs a program and returns its output; panics with its stderr on failure.
 pub fn run(command: &mut Command) -> String {
     let output = command.output().expect("started");
     let complaint = String::from_utf8_lossy(&output.stderr);
@@ -36,7 +36,7 @@ pub fn run(command: &mut Command) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// 80 x 60 px with a lens.
+/// A sensor of 80 x 60 px with lens distortion.
 fn sensor() -> Sensor {
     let plain = kinect_v1(8);
     let camera =
@@ -76,7 +76,7 @@ fn shaped(statistic: Statistic, bases: Vec<Basis>, size: f64) -> Effect {
     Effect { id: UNEXPLAINED.into(), shape, ..Effect::default() }
 }
 
-/// Every kind of basis, over every coordinate and times every modulation that a picture has.
+/// Every kind of basis, with all coordinates and modulations that an image has.
 fn bases() -> Vec<Basis> {
     use Coordinate as C;
     use Modulation as M;
@@ -112,10 +112,10 @@ fn bases() -> Vec<Basis> {
     ]
 }
 
-/// The model whose shapes were learnt over a part of the range.
+/// Name of the model whose shapes were learnt over a part of the range.
 const HELD: &str = "held";
 
-/// Models that between them hold all that there is.
+/// Models that together contain everything that can be exported.
 pub fn models() -> Vec<(&'static str, NoiseModel)> {
     let one = |basis: &Basis| vec![shaped(Statistic::Bias, vec![basis.clone()], 0.03)];
     let biases = || {
@@ -127,8 +127,8 @@ pub fn models() -> Vec<(&'static str, NoiseModel)> {
             named("pixel-locking", json!({"amplitude_px": 0.05})),
         ]
     };
-    // The formula scales the noise before it is rounded, the term that stands for it the rounded: of
-    // raw disparities, whose steps are coarse, that would be another noise.
+    // The vignetting formula scales the noise before rounding, the exported term after it: with the coarse
+    // steps of raw disparities the noise would differ.
     let formulas = || biases().into_iter().chain([named("vignetting", json!({}))]).collect();
     let learnt = |effect: Effect| Effect { learnt_px: Some([3.0, 5.0]), ..effect };
     let mut models = vec![
@@ -143,7 +143,7 @@ pub fn models() -> Vec<(&'static str, NoiseModel)> {
     models
 }
 
-/// A tilted wall before a nearer one, with noise, holes and a depth of zero.
+/// A tilted wall behind a nearer board, with noise, holes and zero depths.
 fn picture(sensor: &Sensor) -> Vec<f32> {
     let rays = sensor.camera.rays();
     let (wall, board) = (Plane::tilted(2.2, 0.7, 0.5), Plane::tilted(1.1, 0.4, -2.0));
@@ -164,7 +164,7 @@ const SESSION_S: f64 = 400.0;
 const TEMPERATURE_C: f64 = 23.5;
 const AMBIENT_LUX: f64 = 300.0;
 
-/// With and without a thermometer.
+/// The conditions with and without a thermometer.
 fn conditions() -> [Conditions; 2] {
     let known = Conditions {
         session_s: SESSION_S,
@@ -176,14 +176,14 @@ fn conditions() -> [Conditions; 2] {
 
 const INSTANT: Instant = Instant { view: 0, frame: 0, session_s: SESSION_S, view_s: 0.0 };
 
-/// What a program is asked, and what this library answers.
+/// Input of a program and this library's answers.
 struct Case {
     folder: tempfile::TempDir,
     corrected: [Vec<f64>; 2],
     /// Stored depths, m.
     depth: Vec<f32>,
     sigma: [Vec<f64>; 2],
-    /// Of places inside the range, at its edges and beyond.
+    /// At places inside the range, at its edges and beyond.
     surface: Vec<f64>,
     stored: Vec<f64>,
 }
@@ -268,18 +268,18 @@ impl Case {
     fn check(&self, name: &str, code: DepthCode) {
         same(name, "sigma", &read_doubles(&self.at("surface")), &self.surface, |_| 1.0);
         for (k, (corrected, sigma)) in self.corrected.iter().zip(&self.sigma).enumerate() {
-            // To 1e-12 of the disparity: where a bias leaves little of it, the depth magnifies.
+            // To 1e-12 of the disparity: where a bias leaves little of it, the depth magnifies the error.
             let magnified = |i: usize| (corrected[i] / f64::from(self.depth[i])).max(1.0);
             let read = |what: &str| read_doubles(&self.at(&format!("{what}{k}")));
             same(name, "correct", &read("corrected"), corrected, magnified);
             same(name, "sigma_image", &read("sigma"), sigma, magnified);
         }
-        // The simulator does not hold shapes beyond what they were learnt at.
+        // The simulator does not hold shapes beyond the range they were learnt at.
         if name == HELD {
             return;
         }
-        // The simulator works in single precision: a depth on the brink between two raw values may
-        // fall to the other side, and none farther.
+        // The simulator works in single precision: a depth at the boundary of two raw values may round to the
+        // other one, but no further.
         let sampled = read_doubles(&self.at("sampled"));
         let apart = |(a, b): &(&f64, &f64)| !(a == b || (a.is_nan() && b.is_nan()));
         let others: Vec<_> = sampled.iter().zip(&self.stored).filter(apart).collect();
@@ -292,7 +292,7 @@ impl Case {
     }
 }
 
-/// To 1e-12 of the number, times what its computation magnifies errors by.
+/// Asserts equality to 1e-12, times the factor by which the computation magnifies errors.
 fn same(name: &str, what: &str, found: &[f64], truth: &[f64], magnified: impl Fn(usize) -> f64) {
     assert_eq!(found.len(), truth.len(), "{name} {what}");
     for (i, (a, b)) in found.iter().zip(truth).enumerate() {
@@ -404,7 +404,7 @@ fn the_c_header_is_the_model() {
     }
 }
 
-/// Each form, of depth and across the plane, without a sensor.
+/// Each form, as axial and as perpendicular noise, without a sensor.
 #[test]
 fn every_form_of_sigma_is_the_same_in_python() {
     let Some(python) = python_with("types") else { return };

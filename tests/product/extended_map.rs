@@ -1,5 +1,5 @@
-//! What a diagnosis is for: a sensor errs in a way that its sigma does not tell, a recording of a
-//! wall shows it, and the map of another place gets better by it.
+//! The purpose of a diagnosis: a sensor has an error that its sigma does not describe, a recording of a wall
+//! shows it, and correcting it improves the map of another place.
 
 use std::path::Path;
 
@@ -15,20 +15,20 @@ use kinoise::{NoiseModel, Seed, SigmaModel};
 
 use crate::common::kinoise;
 
-/// A bowl of disparity, three tenths of a pixel at the corner: a Kinect without calibration.
+/// A disparity bowl of three tenths of a pixel at the corner, as of an uncalibrated Kinect.
 const BOWL: (&str, &str, f64) = ("radial-disparity-bias", "k_px", 0.3);
-/// Were the extended model no better, it would win five of five with probability 1/32; by half or
-/// less each time, hardly ever.
+/// If the extended model were no better, it would win five of five with probability 1/32; by half or more
+/// each time, almost never.
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 
 fn done(arguments: &[&str]) {
     let out = kinoise().args(arguments).output().unwrap();
-    // 1 is diagnose's mismatch.
+    // Exit code 1 is the mismatch of diagnose.
     let said = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.code().is_some_and(|code| code < 2), "{arguments:?}: {said}");
 }
 
-/// The bare sigma model and the extended one, of 15 views of a wall.
+/// The bare sigma model and the extended one, from 15 views of a wall.
 fn models(root: &Path, seed: &str) -> [NoiseModel; 2] {
     let of = |name: &str| root.join(name).to_string_lossy().into_owned();
     let [rec, bare, extended] = ["wall", "bare", "extended"].map(of);
@@ -42,7 +42,7 @@ fn models(root: &Path, seed: &str) -> [NoiseModel; 2] {
     [bare, format!("{extended}/model.json")].map(|f| NoiseModel::read(Path::new(&f)).unwrap())
 }
 
-/// The office through the same sensor.
+/// The office filmed through the same sensor.
 fn office(root: &Path, seed: u64) -> Sequence {
     let mut bowl = Effect { id: BOWL.0.into(), ..Effect::default() };
     bowl.parameters.insert(BOWL.1.into(), BOWL.2.into());

@@ -1,6 +1,6 @@
-//! Faults of the machine: a disk that is full, an answer that nobody can take, files that go while they
-//! are read. One message and exit code 2, or a result that says what it lacks; and nothing is left.
-//! reports/reliability has the same at length.
+//! Machine faults: a full disk, an unwritable stdout, files that vanish while they are read. The result is
+//! one message and exit code 2, or a result that names what it lacks; nothing is left behind.
+//! reports/reliability covers the same at length.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use kinoise::{CalibrateOptions, measure_recording, model_of};
 use crate::common::{GOOD_VIEWS, copy_tree, good, tree, write_depth};
 use crate::desk::Desk;
 
-/// The program with the words of `line`, started by a shell's `before`.
+/// The program with the words of `line`, after the shell command `before`.
 fn shell(desk: &Desk, before: &str, line: &str) -> Command {
     let mut command = Command::new("bash");
     command.current_dir(desk.path());
@@ -33,7 +33,7 @@ fn failed(output: &Output, line: &str, needle: &str) {
     assert!(message.starts_with("kinoise: ") && message.contains(needle), "{line}: {said}");
 }
 
-/// The limit of a file's size breaks off a write as a full disk does.
+/// A file size limit aborts a write like a full disk.
 #[test]
 fn a_full_disk_costs_the_run_and_nothing_that_was_there() {
     let desk = Desk::furnished();
@@ -55,7 +55,7 @@ fn a_full_disk_costs_the_run_and_nothing_that_was_there() {
         assert!(tree(desk.path()) == before, "{line}: something was written");
         assert!(!desk.at("out").exists(), "{line}");
 
-        // Over results of an earlier run, which stay as they are.
+        // Over results of an earlier run, which must stay unchanged.
         let done = shell(&desk, "", line).output().expect("bash");
         assert!(matches!(done.status.code(), Some(0 | 1)), "{line}: {}", said(&done));
         let before = tree(desk.path());
@@ -84,7 +84,7 @@ fn an_answer_that_nobody_gets_is_a_failure_and_a_lost_message_is_none() {
         let full = fs::File::options().write(true).open("/dev/full").expect("a device");
         let output = shell(&desk, "", line).stdout(full).output().expect("bash");
         failed(&output, line, "stdout");
-        // A reader that has seen enough is no failure.
+        // A reader that closes early is no failure.
         let closed = shell(&desk, "exec 1> >(:); sleep 0.1;", line).stderr(Stdio::null()).status();
         assert_eq!(closed.expect("bash").code(), Some(0), "{line}");
         let _ = fs::remove_dir_all(desk.at("out"));
@@ -98,10 +98,10 @@ fn an_answer_that_nobody_gets_is_a_failure_and_a_lost_message_is_none() {
     }
 }
 
-/// What is done to a view behind the reader's back.
+/// A change to a view while it is being read.
 type Change = fn(&Path);
 
-/// Between the look at the lists and the reading of the images.
+/// Changes files after the lists were read and before the images are.
 #[test]
 fn a_recording_that_changes_while_it_is_read_costs_what_has_changed() {
     let changes: [(&str, Change); 6] = [
@@ -136,7 +136,7 @@ fn a_recording_that_changes_while_it_is_read_costs_what_has_changed() {
         assert_eq!(lost, measured.views.len() < GOOD_VIEWS, "{what}");
         match model_of(&recording, &measured, &options) {
             Ok(found) => assert!(found.model.sigma.sigma(2.0, 0.0) > 0.0, "{what}"),
-            // A model says what it was made of, by hashes of the lists.
+            // A model records hashes of its input, including the lists.
             Err(e) => {
                 assert!(what.contains("gone") && e.to_string().contains("0005/depth.txt"), "{e}")
             }

@@ -1,4 +1,4 @@
-//! The fit against independent truth: exact tables, and scipy on a noisy one.
+//! The fit compared with independent truth: exact tables, and scipy on a noisy one.
 
 use std::path::Path;
 
@@ -38,8 +38,8 @@ fn an_exact_table_gives_its_six_coefficients_back() {
     }
 }
 
-/// Values of an independent fit (scipy: 200 starts, model-weighted relative residuals iterated to
-/// 1e-11, then a polish in 50 digits) of tests/data/noisy_eq1.csv.
+/// An independent fit of tests/data/noisy_eq1.csv (scipy: 200 starts, model-weighted relative residuals
+/// iterated to 1e-11, then a polish with 50 digits).
 const SCIPY: [f64; 6] = [
     0.00151728403599,
     0.0021526190952,
@@ -48,7 +48,7 @@ const SCIPY: [f64; 6] = [
     1.99179866393,
     1.39010132467,
 ];
-/// Its standard errors, which are scaled by the root of chi^2/dof = 0.447 where 0.5 is expected.
+/// Its standard errors, scaled by the square root of chi^2/dof = 0.447 where 0.5 is expected.
 const SCIPY_STD_ERRORS: [f64; 6] = [1.174e-5, 7.860e-6, 5.189e-3, 1.252e-7, 2.247e-2, 2.005e-3];
 
 #[test]
@@ -63,8 +63,8 @@ fn a_noisy_table_ends_where_scipy_ends() {
     }
 }
 
-/// 200 noisy tables (3 and 10 %): the chosen minimum is never worse than what a fit started at
-/// the truth finds, so there is no second place to end in.
+/// 200 noisy tables (3 and 10 %): the fit is never worse than the true coefficients, so it does not end in
+/// a wrong minimum.
 #[test]
 fn no_table_ends_in_a_wrong_minimum() {
     let mut rng = Seed(11).stream("tables");
@@ -89,14 +89,13 @@ fn no_table_ends_in_a_wrong_minimum() {
         let values = fitted.values();
         let own = deviance(&|r| Form::Paper.spec().sigma(&values, r.z_m, r.theta_rad));
         let truth = deviance(&|r| Form::Paper.spec().sigma(&PAPER_EQ1, r.z_m, r.theta_rad));
-        // The gamma deviance is what the weighting minimises; the fit must beat the truth.
+        // The weighting minimises the gamma deviance; the fit must be at least as good as the truth.
         assert!(own <= truth, "trial {trial}: {own} > {truth}");
         assert!(fitted.converged, "trial {trial}");
     }
 }
 
-/// The order of the rows, and which rows share a view's name, are no part of the answer when
-/// there is one row a view.
+/// With one row per view, the order of the rows does not change the fit.
 #[test]
 fn the_order_of_the_rows_does_not_matter() {
     let mut table = exact([0, 20, 40, 60, 70, 74, 76].into_iter());
@@ -127,7 +126,7 @@ fn coefficients_that_the_views_do_not_show_are_said_so() {
     let all = fitted.remarks.join("\n");
     assert!(all.contains("d, e and f") && all.contains("74 degrees"), "{all}");
     assert!(fitted.parameters[5].std_error.is_none(), "f is held");
-    // c with views from 3 m on only.
+    // c is not determined by views from 3 m on.
     let mut far = noisy(exact([0, 30, 60, 70, 74, 76].into_iter()));
     far.rows.retain(|r| r.z_m >= 3.0);
     let all = fit(&far, Form::Paper).unwrap().remarks.join("\n");
@@ -152,12 +151,12 @@ fn held_out_distances_prefer_the_form_that_made_the_data() {
         assert_eq!(scores.len(), 4, "{form}: {scores:?}");
         let best = scores[0].log_score;
         let own = scores.iter().find(|s| s.form == form).unwrap().log_score;
-        // A larger form that contains the true one may win by chance, never by much.
+        // A larger form that contains the true one may win by chance, but never by much.
         assert!(best - own < 0.1, "{form}: {scores:?}");
     }
 }
 
-/// Too little to fit: a typed error with a remedy, not a wild surface.
+/// Too little data: a typed error with a remedy, not a wild surface.
 #[test]
 fn one_distance_or_three_rows_are_refused() {
     let mut table = exact([0, 20, 40, 60, 70].into_iter());
@@ -176,7 +175,7 @@ fn one_distance_or_three_rows_are_refused() {
     }
 }
 
-/// Whatever is asked of a model, the answer is finite and positive.
+/// For any argument, sigma is finite and positive.
 #[test]
 fn sigma_never_reaches_the_pole() {
     let fitted = fit(&exact((0..=76).step_by(4)), Form::Paper).unwrap();
@@ -192,7 +191,7 @@ fn sigma_never_reaches_the_pole() {
     assert!(!SigmaModel::paper().domain.contains(2.0, 1.389));
 }
 
-/// A bin that caught a neighbouring object, a view of something else: told, and without pull.
+/// A bin that caught a neighbouring object or a view of something else is reported and does not pull the fit.
 #[test]
 fn sigmas_far_off_the_surface_are_left_out_and_told() {
     let mut rng = Seed(21).stream("noise");

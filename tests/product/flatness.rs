@@ -1,4 +1,4 @@
-//! Targets that are bent, and bowls: how much of them, and what is stated of the target's flatness.
+//! Bent targets and bowls: their detection, and the effect of a stated flatness of the target.
 
 use kinoise::diagnose::{DiagnoseOptions, diagnose};
 use kinoise::effects::Active;
@@ -8,7 +8,7 @@ use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
 use kinoise::view::{TargetSize, ViewNotes};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 
-/// Every name that a diagnosis of a board that is bent by 5 mm mentions, with what is stated of it.
+/// Effect and alternatives of every finding on a board bent by 5 mm, with this flatness stated.
 fn names(flatness_m: Option<f64>) -> Vec<(Option<&'static str>, Vec<&'static str>)> {
     let folder = tempfile::tempdir().expect("a folder");
     let poses =
@@ -32,8 +32,8 @@ fn names(flatness_m: Option<f64>) -> Vec<(Option<&'static str>, Vec<&'static str
     findings.map(|f| (f.effect, f.alternatives.iter().map(|a| a.effect).collect())).collect()
 }
 
-/// A board that is stated to be flat to 0.2 mm is not called bent by 5 mm, whatever the pictures show;
-/// one of which 8 mm or nothing is stated is.
+/// A board stated to be flat to 0.2 mm is not called bent by 5 mm, whatever the images show; one stated to be
+/// flat to 8 mm, or without a statement, is.
 #[test]
 fn a_board_that_is_stated_to_be_flat_is_not_called_bent() {
     const BOW: &str = "target-bow";
@@ -49,8 +49,8 @@ fn a_board_that_is_stated_to_be_flat_is_not_called_bent() {
     assert!(!found.iter().any(mentions), "{found:?}");
 }
 
-/// The stronger, the surer: a bowl of ten times the noise is not taken for noise that hangs together, neither
-/// in a tiny picture nor in one that it bends by pixels.
+/// A stronger bowl must not be harder to find: ten times the noise is not mistaken for spatially correlated
+/// noise, neither in a tiny image nor in one bent by several pixels.
 #[test]
 fn a_bowl_does_not_hide_itself() {
     let poses = Grid { distances_m: vec![1.0, 1.5, 2.0, 3.0], tilts_rad: vec![0.0, 0.5, 1.0] };

@@ -1,5 +1,5 @@
-//! Numbers, files and names that nobody means: one message and exit code 2, in no time and little
-//! memory. Never "match", never a hang, never somebody else's file in the result.
+//! Absurd numbers, files and names: one message and exit code 2, quickly and with little memory. Never
+//! "match", never a hang, never a foreign file in the result.
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
@@ -12,13 +12,13 @@ use serde_json::{Value, json};
 use crate::common::{good, kinoise, write_png};
 use crate::desk::{Desk, fifo};
 
-/// A file of a terabyte without a byte on the disk.
+/// A sparse file of a terabyte.
 fn sparse(path: &Path) {
     let file = fs::File::create(path).expect("made");
     file.set_len(1 << 40).expect("a disk with sparse files");
 }
 
-/// A surface seen edge on had no sigma, and with it no place.
+/// Regression test: a surface seen edge on had no sigma, and so no position.
 #[test]
 fn every_point_of_a_map_is_a_number_and_none_is_certain() {
     let desk = Desk::new();
@@ -37,7 +37,7 @@ fn every_point_of_a_map_is_a_number_and_none_is_certain() {
     }
 }
 
-/// Days of work, and counts that a number does not hold.
+/// Refuses days of work and counts that overflow.
 #[test]
 fn options_of_a_map_have_their_ranges() {
     let desk = Desk::new();
@@ -60,7 +60,7 @@ fn options_of_a_map_have_their_ranges() {
     desk.done("map film -o out --iterations 1000 --memory 108000");
 }
 
-/// An alignment without a pair of points has no distance between them.
+/// An alignment without any pair of points has no distance between them.
 #[test]
 fn a_lost_frame_has_no_number_that_is_none() {
     let desk = Desk::new();
@@ -76,7 +76,7 @@ fn a_lost_frame_has_no_number_that_is_none() {
     );
 }
 
-/// A square of the number of a place must be a number.
+/// The square of a coordinate must be finite.
 #[test]
 fn poses_that_are_nowhere_are_refused_with_their_line() {
     let desk = Desk::new();
@@ -97,7 +97,7 @@ fn poses_that_are_nowhere_are_refused_with_their_line() {
     }
 }
 
-/// The search for the nearest rotation has no end where there is none.
+/// The search for the nearest rotation would not end where there is none.
 #[test]
 fn poses_of_7_scenes_that_are_no_rotations_name_their_file() {
     let desk = Desk::new();
@@ -126,7 +126,7 @@ fn poses_of_7_scenes_that_are_no_rotations_name_their_file() {
     desk.done(map);
 }
 
-/// A baseline in mm took gigabytes.
+/// Regression test: a baseline in mm allocated gigabytes.
 #[test]
 fn numbers_of_another_unit_are_named_by_key_and_line() {
     let text = fs::read_to_string(good().join("recording.json")).expect("text");
@@ -148,7 +148,7 @@ fn numbers_of_another_unit_are_named_by_key_and_line() {
         let says = [&*format!("recording.json, line {line}: "), key];
         desk.refused("diagnose rec -o out", &says);
     }
-    // Together they are as wrong: 3 m are a baseline, but not before a lens of so few degrees.
+    // Wrong only together: 2.5 m is an allowed baseline, but not with such a narrow lens.
     let desk = Desk::new();
     let tele = text.replace("0.075", "2.5").replace("145.0", "1450.0");
     desk.put("rec/recording.json", tele);
@@ -166,7 +166,7 @@ fn numbers_of_another_unit_are_named_by_key_and_line() {
     }
 }
 
-/// "match" was said of some of these.
+/// Regression test: some of these gave "match".
 #[test]
 fn an_absurd_model_is_an_error_for_every_command() {
     let effect = |id: &str, parameters: Value| json!([{"id": id, "parameters": parameters}]);
@@ -196,7 +196,7 @@ fn an_absurd_model_is_an_error_for_every_command() {
     }
 }
 
-/// A private file came out in a corrected recording.
+/// Regression test: a private file was copied into a corrected recording.
 #[test]
 fn nothing_outside_a_recording_is_copied() {
     let outside = tempfile::tempdir().expect("a folder");
@@ -234,7 +234,7 @@ fn nothing_outside_a_recording_is_copied() {
     desk.refused(correct, &["rec/pipe"]);
 }
 
-/// Engineers split recordings by links to their views.
+/// Recordings are often split by links to their views.
 #[test]
 fn views_may_be_links() {
     let desk = Desk::new();
@@ -275,7 +275,7 @@ fn pipes_devices_and_sparse_files_are_no_input() {
         }
         desk.refused(&format!("calibrate {odd} -o out"), &[odd]);
         desk.refused(&format!("map {odd} -o out"), &[odd]);
-        // In a recording: its list, and an image.
+        // As a list and as an image of a recording.
         let bad = Desk::new();
         for name in ["rec/0000/depth.txt", "rec/0001/view.json"] {
             let _ = fs::remove_file(bad.at(name));
@@ -290,7 +290,7 @@ fn pipes_devices_and_sparse_files_are_no_input() {
     }
 }
 
-/// Half a megabyte of PNG may be gigabytes of pixels.
+/// Half a megabyte of PNG may decompress to gigabytes of pixels.
 #[test]
 fn images_of_another_size_are_not_unpacked() {
     let desk = Desk::new();
@@ -302,14 +302,14 @@ fn images_of_another_size_are_not_unpacked() {
     assert!(read.to_string().contains("4000 x 4000 px, the depth 160 x 120"), "{read}");
     let read = kinoise::io::ColourImage::read(&bomb, [160, 120]).expect_err("another size");
     assert!(read.to_string().contains("4000 x 4000 px, the depth 160 x 120"), "{read}");
-    // The header says enough: of the pixels hardly any is there.
+    // The header suffices: almost all pixels are cut off.
     let bytes = fs::read(&bomb).expect("read");
     fs::write(&bomb, &bytes[..60]).expect("written");
     let read = kinoise::io::InfraredImage::read(&bomb, [160, 120]).expect_err("another size");
     assert!(read.to_string().contains("4000 x 4000 px"), "{read}");
 }
 
-/// An escape sequence, and a line that looks like the program's own.
+/// A view's name with an escape sequence and a line that looks like the program's own.
 #[test]
 fn names_do_not_steer_the_terminal() {
     let desk = Desk::new();
@@ -351,7 +351,7 @@ fn words_that_are_no_text_are_refused() {
     }
 }
 
-/// Root may look into any folder: without another user to be, there is nothing to see.
+/// Root may read any folder: then the test shows nothing.
 #[test]
 fn a_folder_that_may_not_be_read_is_told() {
     let desk = Desk::new();
@@ -362,7 +362,7 @@ fn a_folder_that_may_not_be_read_is_told() {
     assert!(readable || told.contains("view 0000 was left out"), "{told}");
 }
 
-/// What one run would write over another's the second is told at once.
+/// A run refuses a folder that another run is writing.
 #[test]
 fn two_runs_do_not_share_a_folder() {
     use kinoise::io::{Leaves, OutputFolder};
@@ -375,13 +375,13 @@ fn two_runs_do_not_share_a_folder() {
     desk.done("calibrate rec -o out");
 }
 
-/// 40,000 rows took two minutes.
+/// Regression test: 40,000 rows took two minutes.
 #[test]
 fn a_table_of_many_rows_is_pooled_and_says_so() {
     let sigma = SigmaModel::paper();
     let mut text = String::from("z_m,theta_rad,sigma_m,n\n");
     for k in 0..40_000 {
-        // Every distance and tilt once, and an error of 5 % that is no pattern of either.
+        // Every distance and tilt once, with an error of 5 % that follows no pattern.
         let (a, b) = (f64::from(k % 200) / 200.0, f64::from(k / 200) / 200.0);
         let (z, theta) = (1.0 + 3.0 * a, 1.2 * b);
         let off = 1.0 + 0.05 * (f64::from(k) * 12.9898).sin();
@@ -398,7 +398,7 @@ fn a_table_of_many_rows_is_pooled_and_says_so() {
     }
 }
 
-/// A killed run cannot tidy up; the next one does, and leaves what another is filling.
+/// A killed run cannot clean up; the next one does, but keeps what another run is writing.
 #[test]
 fn what_a_killed_run_left_goes_with_the_next() {
     use kinoise::io::{Leaves, OutputFolder};
@@ -417,7 +417,7 @@ fn what_a_killed_run_left_goes_with_the_next() {
     let stays = [alive.path(), &desk.at(".kinoise-1-1.kept"), &desk.at(".kinoise-1-2")];
     assert!(stays.iter().all(|folder| folder.exists()));
 
-    // So does the file that a killed export was writing.
+    // The same for the file that a killed export was writing.
     desk.model("model.json", |_| ());
     for (name, age) in [(".kinoise-old", 3600), (".kinoise-new", 1)] {
         desk.put(name, "half");
@@ -429,7 +429,7 @@ fn what_a_killed_run_left_goes_with_the_next() {
     assert!(!desk.at(".kinoise-old").exists() && desk.at(".kinoise-new").exists());
 }
 
-/// Renamed over it, a result would take the place of a device for good.
+/// A result renamed over a device would replace it for good.
 #[test]
 fn a_result_does_not_replace_a_pipe_or_a_device() {
     let desk = Desk::new();

@@ -1,5 +1,5 @@
-//! What must not matter does not: which way round a sensor sees, how large its world is, in what order
-//! files were written, where in the world the program runs.
+//! Invariances: results do not depend on the orientation of the image, the scale of the world, the order in
+//! which files were written, or the locale.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,14 +16,14 @@ use kinoise::{
 
 use crate::common::{copy_tree, good, grid, kinoise, shots, tree, write_depth};
 
-/// What is done to a recording.
+/// Transformation of a recording.
 #[derive(Clone, Copy)]
 enum Turn {
-    /// Left for right.
+    /// Left and right swapped.
     Mirrored,
-    /// Columns for rows.
+    /// Rows and columns swapped.
     Transposed,
-    /// Everything twice as large and twice as far away, the sensor too.
+    /// The whole world twice as large, sensor included.
     Doubled,
 }
 
@@ -31,7 +31,7 @@ impl Turn {
     fn sensor(self, sensor: Sensor) -> Sensor {
         let mut camera = sensor.camera.clone();
         match self {
-            // The principal point is in the middle.
+            // The principal point is central.
             Turn::Mirrored => sensor,
             Turn::Transposed => {
                 let old = sensor.camera.clone();
@@ -64,7 +64,7 @@ impl Turn {
         }
     }
 
-    /// A copy of the recording in `from`.
+    /// Writes a transformed copy of the recording in `from`.
     fn recording(self, from: &Path, to: &Path) -> Recording {
         copy_tree(from, to);
         let sensor = io::open(from, &Default::default()).expect("a recording").sensor;
@@ -89,7 +89,7 @@ fn sigma_of(recording: &Recording) -> SigmaModel {
     model_of(recording, &measured, &options).expect("a model").model.sigma
 }
 
-/// Mirrored and rotated: determinism.rs.
+/// Mirrored and rotated recordings are tested in determinism.rs.
 #[test]
 fn a_transposed_recording_has_the_same_noise_and_a_doubled_one_has_twice_as_much() {
     let plain = sigma_of(&io::open(good(), &Default::default()).expect("a recording"));
@@ -103,7 +103,7 @@ fn a_transposed_recording_has_the_same_noise_and_a_doubled_one_has_twice_as_much
     }
 }
 
-/// A wall at five distances and three tilts, seen with one effect.
+/// A wall at five distances and three tilts, with one effect.
 fn with_effect(root: &Path, effect: &str) {
     let distances_m = vec![1.0, 1.5, 2.0, 3.0, 4.0];
     let poses = Grid { distances_m, tilts_rad: vec![0.0, 0.5, 0.9] }.views();
@@ -114,7 +114,7 @@ fn with_effect(root: &Path, effect: &str) {
     shoot.write(root, &|_, _| ()).expect("a recording");
 }
 
-/// The first finding against Eq. 1, as it is for a world `scale` times as large.
+/// The first finding against Eq. 1, scaled to a world `scale` times as large.
 fn first_finding(recording: &Recording, scale: f64) -> Finding {
     let mut model = NoiseModel::paper();
     model.sensor = Some(RecordingFile::of(&recording.sensor));
@@ -124,7 +124,7 @@ fn first_finding(recording: &Recording, scale: f64) -> Finding {
     findings.into_iter().next().expect("a finding")
 }
 
-/// Eq. 1 of a world `scale` times as large: sigma(scale z) = scale times sigma(z).
+/// Eq. 1 in a world `scale` times as large: sigma(scale z) = scale sigma(z).
 fn scaled(sigma: &SigmaModel, scale: f64) -> SigmaModel {
     let [a, b, c, d, e, f] = sigma.parameters[..] else { panic!("Eq. 1") };
     let parameters = [a * scale, b / scale, c * scale, d * scale.powf(1.0 - e), e, f];
@@ -142,7 +142,7 @@ fn value(finding: &Finding, key: &str) -> [f64; 2] {
     ["value", "std_error"].map(|k| finding.parameters[key][k].as_f64().expect("a number"))
 }
 
-/// A bowl about the middle is itself in a mirror, on its side, and in a world twice as large.
+/// A centred bowl is unchanged when mirrored, transposed, or in a world twice as large.
 #[test]
 fn the_bowl_of_a_turned_recording_is_the_turned_bowl() {
     let folder = folder();
@@ -158,12 +158,12 @@ fn the_bowl_of_a_turned_recording_is_the_turned_bowl() {
         fs::remove_dir_all(&to).expect("removed");
         assert_eq!(turned.effect, plain.effect);
         let [other, _] = value(&turned, "k_px");
-        // Patches lie elsewhere on the turned picture: the same data, cut in another way.
+        // Patches lie elsewhere in the transformed image: the same data, divided differently.
         assert!((other - k).abs() < error, "{other} px, not {k} +- {error}");
     }
 }
 
-/// Noise that is larger along one axis is larger along the other one on its side.
+/// Anisotropic noise swaps its axes when transposed.
 #[test]
 fn the_tilt_axis_of_a_transposed_recording_is_the_other_one() {
     let folder = folder();
@@ -179,7 +179,7 @@ fn the_tilt_axis_of_a_transposed_recording_is_the_other_one() {
     assert!((a * b).ln().abs() < relative, "{a} and {b}");
 }
 
-/// Files of `out` after a run on `recording`, which is under the same name each time.
+/// Files of `out` after a run on `recording`, which has the same name each time.
 fn results(
     folder: &Path,
     command: &[&str],
@@ -208,7 +208,7 @@ fn same(a: &[(PathBuf, Vec<u8>)], b: &[(PathBuf, Vec<u8>)]) {
     }
 }
 
-/// Folders list their files in the order of making, or the reverse, or by a hash.
+/// Folders list their files in order of creation, in reverse, or by a hash.
 #[test]
 fn files_written_in_another_order_give_the_same_bytes() {
     let folder = folder();
@@ -226,13 +226,13 @@ fn files_written_in_another_order_give_the_same_bytes() {
         fs::remove_dir_all(&root).expect("removed");
         match turn {
             0 => files.reverse(),
-            // In no order at all: by what is in them.
+            // In arbitrary order: by the hash of their content.
             _ => files.sort_by_key(|(_, bytes)| io::sha256_hex(bytes)),
         }
     }
 }
 
-/// Sums over views are the same numbers in another order.
+/// Sums over views agree in any order.
 #[test]
 fn views_in_another_order_give_the_same_model() {
     let mut recording = io::open(good(), &Default::default()).expect("a recording");
@@ -262,7 +262,7 @@ fn threads_languages_and_time_zones_change_no_byte() {
     }
 }
 
-/// A view that was stored twice is one measurement: the coefficients are no surer for it.
+/// A view stored twice is one measurement: the coefficients are no more certain for it.
 #[test]
 fn a_copy_of_a_view_is_no_other_view() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -287,8 +287,8 @@ fn a_copy_of_a_view_is_no_other_view() {
     assert_eq!(once, twice);
 }
 
-/// A driver that hands out frames twice: neither the measurement nor the diagnosis is surer for it, nor sees it as noise
-/// that stands still.
+/// A driver that delivers frames twice makes neither the measurement nor the diagnosis more certain, and its
+/// copies are not taken for frozen noise.
 #[test]
 fn a_frame_stored_twice_is_one_frame() {
     let recording = io::open(good(), &io::Assumed::default()).expect("a recording");
@@ -315,11 +315,11 @@ fn a_frame_stored_twice_is_one_frame() {
     assert!(remarks.contains(&told), "{remarks:?}");
 }
 
-/// A frame of the view before, as drivers hand out when a recording begins, is not noise over time.
+/// A frame left from the previous view, as drivers deliver when a recording begins, is not temporal noise.
 #[test]
 fn a_stale_frame_is_left_out_of_the_diagnosis_and_told() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // Of two or three frames nobody knows which one is stale.
+    // Among only two or three frames it is unknown which one is stale.
     shots(grid(&[1.0, 1.5, 2.0, 3.0], &[0.0, 30.0, 60.0]), 4, 1)
         .write(folder.path(), &|_, _| ())
         .expect("written");

@@ -1,4 +1,4 @@
-//! What textures and tails gain on views that had no part in the search.
+//! Gain of noise textures and tails on held-out views.
 
 use kinoise::diagnose::{DiagnoseOptions, Diagnosis, HeldOut, Status, Verdict, diagnose};
 use kinoise::effects::Active;
@@ -7,7 +7,7 @@ use kinoise::scene::Target;
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 
-/// A wall in fifteen views of eight frames with this effect, held against the plain model.
+/// Diagnosis of a wall in fifteen views of eight frames with this effect, against the plain model.
 fn diagnosis(effect: &str) -> Diagnosis {
     let folder = tempfile::tempdir().expect("a folder");
     let poses =
@@ -38,20 +38,20 @@ fn textures_and_tails_gain_on_views_kept_aside() {
         let (first, held) = first_and_held(&said);
         assert_eq!(first, effect.split(':').next());
         assert!(held.gain_interval[0] > 0.0, "{effect}: {:?}", held.gain_interval);
-        // No mean is learnt by it, and nothing is corrected.
+        // These effects change no mean, so nothing is corrected.
         assert_eq!(held.bias_gain_interval, [0.0; 2], "{effect}");
         assert_eq!(held.rms_mm_before, held.rms_mm_after, "{effect}");
     }
 }
 
-/// Steps of the words and losses have no score, which is not to be told as if they gained nothing.
+/// Quantisation steps and dropouts have no score; this must not be reported as no gain.
 #[test]
 fn what_has_no_score_is_not_told_as_no_gain() {
     for effect in ["disparity-quantisation:step_px=0.125", "range-dropout:z50_m=2,width_m=0.4"] {
         let said = diagnosis(effect);
         let (first, held) = first_and_held(&said);
         assert_eq!(first, effect.split(':').next());
-        // What else may be found by chance, a finding of the noise's size, has one.
+        // Other findings may occur by chance; one of the size of the noise has a score.
         let told = || said.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
         let all: Vec<_> = told().map(|f| (f.effect, f.statistic, f.axis)).collect();
         assert!(!said.findings[0].is_scored(), "{all:?}");

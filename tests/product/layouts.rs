@@ -1,5 +1,5 @@
-//! One scene, five layouts: every reader must give the same views, and they must be the truth.
-//! Then the real recordings, where they are at hand.
+//! One scene in five layouts: every reader must give the same views, and they must agree with the truth.
+//! Then real recordings, where available.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -23,10 +23,10 @@ use crate::common::{BOARD, BOARD_HEIGHT_M, data, truth, write_depth};
 
 /// 320 x 240 px.
 const SHRINK: usize = 2;
-/// Frames of a still stretch; a film needs ten.
+/// Frames of a still stretch; a film needs at least ten.
 const STILL: usize = 12;
 const TUM: DepthCode = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
-/// OpenKinect's formula, as the reader of fakenect dumps assumes it.
+/// OpenKinect's formula, which the reader of fakenect dumps assumes.
 const DISPARITY: DepthCode = DepthCode::Disparity {
     offset: 3.330_949_516_1,
     slope: -0.003_071_101_6,
@@ -48,7 +48,7 @@ fn assumed(code: Option<DepthCode>) -> Assumed {
     Assumed { intrinsics: Some([c.fx, c.fy, c.cx, c.cy]), code, ..Assumed::default() }
 }
 
-/// Frame `frame` of the board at `plane`; the same noise whatever the code.
+/// Frame `frame` of the board at `plane`; the noise does not depend on the code.
 fn frame(code: DepthCode, plane: &Plane, pose: usize, frame: usize) -> Frame {
     let sensor = sensor(code);
     let seed = Seed(1000 * pose as u64 + frame as u64);
@@ -63,7 +63,7 @@ fn stills(code: DepthCode) -> Vec<Vec<Frame>> {
         .collect()
 }
 
-/// The frames of a film: stills, and between them the board on its way.
+/// Frames between two still stretches of a film, in which the board moves.
 const MOVING: usize = 5;
 
 fn film(code: DepthCode) -> Vec<Frame> {
@@ -105,7 +105,7 @@ fn write_tum(root: &Path, frames: &[Frame]) {
     fs::write(root.join("depth.txt"), list).expect("written");
 }
 
-/// As fakenect-record writes it: memory as is, low byte first.
+/// Writes a dump as fakenect-record does: raw memory, low byte first.
 fn write_fakenect(root: &Path, frames: &[Frame]) {
     let mut index = String::new();
     for (k, frame) in frames.iter().enumerate() {
@@ -125,7 +125,7 @@ fn measured(recording: &Recording) -> Measurements {
     kinoise::measure_recording(recording, &MeasureOptions::default(), &|_, _| ()).expect("measured")
 }
 
-/// Open what `write` puts into a folder; measure it.
+/// Opens and measures what `write` puts into a folder.
 fn read_back(write: impl Fn(&Path), assumed: &Assumed) -> (Recording, Measurements) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     write(folder.path());
@@ -134,7 +134,7 @@ fn read_back(write: impl Fn(&Path), assumed: &Assumed) -> (Recording, Measuremen
     (recording, measurements)
 }
 
-/// Views in order of the poses, nothing excluded, every number within its own error.
+/// Asserts views in order of the poses, nothing excluded, every number within its own error.
 #[track_caller]
 fn agrees_with_the_truth(m: &Measurements, code: DepthCode) {
     assert!(m.excluded.is_empty(), "{:?}", m.excluded);
@@ -151,19 +151,19 @@ const ERRORS: f64 = 5.0;
 #[track_caller]
 fn one_agrees(view: &ViewMeasurement, pose: &GridView, code: DepthCode) {
     let z = view.z_m;
-    // Sigma is of stored words: the simulator leaves room for what rounding to the code adds.
+    // Sigma is that of stored words: the simulator allows for the rounding to the code.
     let expected = |z: f64| truth().sigma(z, pose.theta_rad);
     let sigma = expected(z);
     let n = view.whole.n as f64;
-    // The plane's depth on the axis: a mean over n residuals; half a word step for the rounding of
-    // frontal planes.
+    // The plane's depth on the axis is a mean over n residuals; half a word for the rounding of frontal
+    // planes.
     let axis = (view.axis_distance_m - pose.z_m).abs();
     let step = code.step_inverse(z) * z * z;
     assert!(axis < ERRORS * sigma / n.sqrt() + 0.02 * step, "{}: axis {axis}", view.name);
-    // The mean over the target: the rim that is left out is not quite symmetrical in depth.
+    // The mean over the target: the excluded rim is not quite symmetrical in depth.
     let mean = (z - mean_depth(pose)).abs();
     assert!(mean < 0.004 * z, "{}: z {z}, {}", view.name, mean_depth(pose));
-    // A slope over a target of width W seen at f px/m: error of the mean over its spread.
+    // The tilt's standard error: the error of the mean divided by the spread of the points.
     let spread = BOARD_HEIGHT_M / 12f64.sqrt() * pose.theta_rad.cos();
     let theta = (view.theta_rad - pose.theta_rad).abs();
     let slope = sigma / n.sqrt() / spread;
@@ -175,7 +175,7 @@ fn one_agrees(view: &ViewMeasurement, pose: &GridView, code: DepthCode) {
     for cell in &view.cells {
         let ratio = cell.spread.spatial_m / expected(cell.z_m) - 1.0;
         let error = (0.5 / cell.n_effective).sqrt();
-        // One percent: sigma grows within a cell, and 3.5 sigmas cut it at a constant.
+        // One percent: sigma grows within a cell, and the cut at 3.5 sigmas is constant.
         assert!(
             ratio.abs() < ERRORS * error + 0.01,
             "{}: sigma off by {ratio} ({error})",
@@ -184,7 +184,7 @@ fn one_agrees(view: &ViewMeasurement, pose: &GridView, code: DepthCode) {
     }
 }
 
-/// Of the board's pixels without noise, m.
+/// Mean depth of the board's pixels without noise, m.
 fn mean_depth(pose: &GridView) -> f64 {
     let sensor = sensor(TUM);
     let rays = sensor.camera.rays();
@@ -240,7 +240,7 @@ fn a_tum_folder_of_small_images_needs_its_intrinsics() {
     assert!(error.contains("320 x 240") && error.contains("--intrinsics"), "{error}");
 }
 
-/// A sensor that starts up writes empty frames; they must not count as "still" with all others.
+/// A sensor writes empty frames while starting up; they must not count as still together with all others.
 #[test]
 fn empty_frames_neither_join_nor_part_a_still_stretch() {
     let empty = Frame { width: 320, height: 240, raw: vec![0; 320 * 240] };
@@ -252,7 +252,7 @@ fn empty_frames_neither_join_nor_part_a_still_stretch() {
     agrees_with_the_truth(&m, TUM);
 }
 
-/// Damaged frames are frames too: they are counted in the whole, and told.
+/// Damaged frames are counted among all frames, and reported.
 #[test]
 fn damaged_frames_of_a_film_are_counted() {
     let frames = film(TUM);
@@ -280,7 +280,7 @@ fn damaged_frames_of_a_film_are_counted() {
     agrees_with_the_truth(&m, TUM);
 }
 
-/// Two places of a small target that share no pixel are two views.
+/// Two positions of a small target without a common pixel are two views.
 #[test]
 fn a_target_that_jumps_aside_has_moved() {
     let half = |right: bool| {
@@ -321,7 +321,7 @@ fn a_fakenect_dump() {
     agrees_with_the_truth(&m, DISPARITY);
 }
 
-/// The layouts carry the same frames: what is measured is the same to the last bit.
+/// The layouts carry the same frames: the measurements agree.
 #[test]
 fn layouts_agree_to_the_last_bit() {
     let numbers = |m: &Measurements| -> Vec<[f64; 4]> {
@@ -330,7 +330,7 @@ fn layouts_agree_to_the_last_bit() {
             .map(|v| [v.z_m, v.theta_rad, v.whole.spread.spatial_m, v.axis_distance_m])
             .collect()
     };
-    // f32 rays from intrinsics that went through a file and ones that did not.
+    // The intrinsics of one went through a file, those of the other did not.
     let (_, a) = read_back(|root| write_recording(root, TUM), &Assumed::default());
     let (_, b) = read_back(|root| write_tum(root, &film(TUM)), &assumed(None));
     // The target's search is seeded by the view's name, and names differ between layouts.
@@ -341,7 +341,7 @@ fn layouts_agree_to_the_last_bit() {
 
 // ---- real data --------------------------------------------------------------------------------
 
-/// Points of the target's region of a view's first frame.
+/// Points in the target's region of a view's first frame, and their rays.
 fn points(recording: &Recording, view: usize) -> (Vec<Vector3<f64>>, Vec<(f64, f64)>) {
     let sensor = &recording.sensor;
     let camera = &sensor.camera;
@@ -362,7 +362,7 @@ fn points(recording: &Recording, view: usize) -> (Vec<Vector3<f64>>, Vec<(f64, f
 }
 
 /// Orthogonal least squares with three rounds of clipping at 3.5 robust standard deviations.
-/// Returns mean depth, tilt, the kept points.
+/// Returns mean depth, tilt, and which points were kept.
 fn total_least_squares(points: &[Vector3<f64>]) -> (f64, f64, Vec<bool>) {
     let mut kept = vec![true; points.len()];
     let mut result = (f64::NAN, f64::NAN);
@@ -387,8 +387,8 @@ fn total_least_squares(points: &[Vector3<f64>]) -> (f64, f64, Vec<bool>) {
     (result.0, result.1, kept)
 }
 
-/// By how much orthogonal least squares misses the tilt of `plane` when noise lies along the rays
-/// and is uniform in inverse depth (of the view's size at its mean depth): mean over draws, rad.
+/// Bias of the tilt of `plane` by orthogonal least squares when the noise lies along the rays and is uniform
+/// in inverse depth (with the view's sigma at its mean depth): mean over draws, rad.
 fn bias_of_total_least_squares(view: &ViewMeasurement, rays: &[(f64, f64)]) -> f64 {
     const DRAWS: usize = 6;
     let sigma_w = view.whole.spread.spatial_m / (view.z_m * view.z_m);
@@ -493,7 +493,7 @@ fn a_published_table_of_another_sensor() {
     assert_eq!(run.status.code(), Some(0), "{stderr}");
     assert!(stderr.contains("tilt"), "that no tilt was seen is told: {stderr}");
     let model = kinoise::NoiseModel::read(&out.join("model.json")).expect("a model");
-    // Their own fit: sigma = max(0.002, 0.0019 d^2.36), good to some ten percent.
+    // The authors' own fit: sigma = max(0.002, 0.0019 d^2.36), good to some ten percent.
     for d in [1.0f64, 2.0, 3.0] {
         let theirs = 0.0019 * d.powf(2.36);
         let ratio = model.sigma.sigma(d, 0.0) / theirs;

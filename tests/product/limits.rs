@@ -1,5 +1,5 @@
-//! What every input may be: names, texts, numbers and files have their limits, and what is beyond them is
-//! refused by its name where it is read.
+//! Limits of every input: names, texts, numbers and files beyond them are refused where they are read, and
+//! named.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::common::write_depth;
 use crate::desk::{Desk, fifo};
 
-/// A newline in the sensor's name wrote a line that looked like the program's own.
+/// Regression test: a newline in the sensor's name wrote a line that looked like the program's own.
 #[test]
 fn a_sensors_name_stands_on_one_line() {
     for (key, name) in [
@@ -33,7 +33,7 @@ fn a_sensors_name_stands_on_one_line() {
     }
 }
 
-/// Of names that no file says: folders have them.
+/// The same for names that stand in no file: folders.
 #[test]
 fn names_of_folders_make_no_lines_of_their_own() {
     let desk = Desk::new();
@@ -53,7 +53,7 @@ fn names_of_folders_make_no_lines_of_their_own() {
     assert!(output.status.success() && !told.contains("\nkinoise: all"), "{told}");
 }
 
-/// 20 MB of "mode" were kept in every result.
+/// Regression test: 20 MB of "mode" were kept in every result.
 #[test]
 fn texts_have_their_length() {
     let long = "x".repeat(1 << 20);
@@ -78,7 +78,7 @@ fn texts_have_their_length() {
     assert!(!desk.done("calibrate rec -o out2").contains("0000 was left out"));
 }
 
-/// "match" was said of a bowl by a name that the catalogue has not: nothing of it acted.
+/// Regression test: a bowl with a name that is not in the catalogue had no effect, and gave "match".
 #[test]
 fn what_an_effect_has_not_is_refused_wherever_a_model_is_read() {
     let desk = Desk::furnished();
@@ -109,7 +109,7 @@ fn what_an_effect_has_not_is_refused_wherever_a_model_is_read() {
     }
 }
 
-/// Ends of +-1e308 overflow where they are subtracted.
+/// Differences of limits of +-1e308 overflow.
 #[test]
 fn every_number_of_a_model_has_a_range() {
     let desk = Desk::new();
@@ -134,7 +134,7 @@ fn every_number_of_a_model_has_a_range() {
     desk.done("correct rec -m model.json -o out");
 }
 
-/// Clipped about a bowl that is not there, no pixel was left to tell it by.
+/// Regression test: clipping about a bowl that is not there left no pixel to detect it by.
 #[test]
 fn a_model_that_is_far_off_is_no_inconclusive_answer() {
     let desk = Desk::new();
@@ -156,7 +156,7 @@ fn a_model_that_is_far_off_is_no_inconclusive_answer() {
     }
 }
 
-/// "match" was said of twelve views of which nine were left out.
+/// Regression test: twelve views of which nine were left out gave "match".
 #[test]
 fn of_a_recording_that_is_mostly_left_out_nothing_is_said() {
     let desk = Desk::new();
@@ -187,7 +187,7 @@ fn an_error_of_the_principal_point_has_its_line() {
     }
 }
 
-/// They were passed over, or called missing.
+/// Regression test: these were ignored, or reported as missing.
 #[test]
 fn what_is_no_regular_file_is_told() {
     for (name, line) in [
@@ -222,7 +222,7 @@ fn what_is_no_regular_file_is_told() {
     assert!(told.contains("9.png") && told.contains("not a regular file"), "{told}");
 }
 
-/// It said that there is none.
+/// Regression test: it reported that there is no ground truth.
 #[test]
 fn a_comparison_names_the_line_of_its_ground_truth() {
     let desk = Desk::furnished();
@@ -233,7 +233,7 @@ fn a_comparison_names_the_line_of_its_ground_truth() {
     desk.refused("compare film -o out", &says);
 }
 
-/// An image larger than its pixels is not one; a list or a video of gigabytes is none of a recording.
+/// An image file far larger than its pixels is no image; lists or videos of gigabytes belong to no recording.
 #[test]
 fn files_of_a_recording_have_the_size_of_their_kind() {
     let sparse = |desk: &Desk, name: &str, megabytes: u64| {
@@ -260,7 +260,7 @@ fn files_of_a_recording_have_the_size_of_their_kind() {
     assert!(told.contains("0000 was left out") && told.contains("MB"), "{told}");
 }
 
-/// A run that begins at once after a kill removes what that one left.
+/// A run right after a kill removes what the killed run left.
 #[test]
 fn what_the_dead_left_goes_whatever_its_age() {
     let desk = Desk::new();
@@ -280,7 +280,8 @@ fn what_the_dead_left_goes_whatever_its_age() {
     assert!(desk.at(&format!(".kinoise-{dead}-1.kept")).exists());
 }
 
-/// "1 measured sigmas" of nobody knew which recording; models of another size likewise.
+/// Regression test: messages such as "1 measured sigmas" did not name the recording; the same for models of
+/// another size.
 #[test]
 fn what_does_not_fit_together_is_named() {
     let desk = Desk::furnished();
@@ -300,7 +301,7 @@ fn what_does_not_fit_together_is_named() {
     }
 }
 
-/// They named this program's types, and numbers with what sums leave behind.
+/// Regression test: messages named this program's types, and numbers with rounding errors of sums.
 #[test]
 fn messages_are_in_plain_words() {
     let board = |flatness: f64| json!({"width_m": 1, "height_m": 0.8, "flatness_m": flatness});
@@ -342,7 +343,7 @@ fn messages_are_in_plain_words() {
     desk.refused("simulate out --effect radial:y=1", &["did you mean radial-disparity-bias?"]);
 }
 
-/// 600 m were told of depths that end with the code, at 13.
+/// Regression test: a shift of 600 m was reported for depths that end with the code, at 13 m.
 #[test]
 fn a_correction_tells_what_it_stored() {
     let desk = Desk::new();
@@ -354,13 +355,13 @@ fn a_correction_tells_what_it_stored() {
     let output = desk.run("correct far -m model.json -o out --json");
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let [clamped, rms_mm] = ["clamped", "rms_shift_mm"].map(|key| told[key].as_f64().expect(key));
-    // From 8 m to the end of the code, where most of them stand.
+    // From 8 m to the end of the code, where most of them are clamped.
     let end_mm = 1e3 * (f64::from(u16::MAX) / 5000.0 - 8.0);
     assert!(clamped > 0.5 * told["pixels"].as_f64().expect("pixels"), "{told}");
     assert!((0.7 * end_mm..1.1 * end_mm).contains(&rms_mm), "{told}");
 }
 
-/// Both were written, and then one stood in the other's way.
+/// Regression test: both were written, and one then got in the way of the other.
 #[test]
 fn a_correction_and_its_uncertainty_lie_apart() {
     let desk = Desk::new();
@@ -372,12 +373,12 @@ fn a_correction_and_its_uncertainty_lie_apart() {
         desk.refused(&line, &["would lie one in the other"]);
         assert!(!desk.at("out").exists() && !desk.at("s").exists());
     }
-    // The way through a folder that is not there leads to where it seems to lead.
+    // A path through a missing folder leads where it appears to lead.
     desk.refused("calibrate rec -o x/../rec/out", &["inside the recording"]);
     assert!(!desk.at("x").exists() && !desk.at("rec/out").exists());
 }
 
-/// What fuzzing found: the bytes of 4 thousand million columns of as many rows have no number.
+/// Found by fuzzing: the number of bytes of 4 thousand million columns by as many rows overflows.
 #[test]
 fn no_size_of_an_image_is_too_large_to_be_refused() {
     let desk = Desk::new();
@@ -390,7 +391,8 @@ fn no_size_of_an_image_is_too_large_to_be_refused() {
     }
 }
 
-/// A recording of an hour was kept beside, for the disk did not take the name that it was to have.
+/// Regression test: a finished recording could not be moved to its place, because the name was too long for
+/// the disk.
 #[test]
 fn what_cannot_be_written_is_told_before_the_work() {
     let desk = Desk::new();
@@ -402,7 +404,8 @@ fn what_cannot_be_written_is_told_before_the_work() {
     assert!(left.iter().all(|name| !name.to_string_lossy().contains("kinoise")), "{left:?}");
 }
 
-/// Options of a film, beside those that a film does not take; and causes that leave nothing to see.
+/// Options of a film given without --room, options that a film does not take, and causes that leave nothing
+/// visible.
 #[test]
 fn options_of_a_film_are_told_without_one() {
     let desk = Desk::new();

@@ -1,4 +1,4 @@
-//! Single columns, or rows, that err by a constant each: told as such, and learnt. And rows that err afresh.
+//! Columns or rows with a constant error each: reported as such, and learnt. And rows with fresh errors.
 
 use kinoise::diagnose::{DiagnoseOptions, Diagnosed, Status, Verdict, diagnose};
 use kinoise::effects::Active;
@@ -10,7 +10,7 @@ use kinoise::terms::{Axis, Basis, Coordinate, Modulation, Statistic, Term};
 use kinoise::{NoiseModel, Recording, Seed, SigmaModel};
 use tempfile::TempDir;
 
-/// A quarter of a Kinect's picture each way.
+/// A quarter of a Kinect's resolution in each direction.
 const BINNING: usize = 4;
 const SIZE: [usize; 2] = [160, 120];
 
@@ -28,7 +28,7 @@ fn wall(effects: Vec<Active>) -> (TempDir, Recording) {
     (folder, recording)
 }
 
-/// With this error at each column (row), px, held against the plain model.
+/// Diagnosis with this error at each column (row), px, against the plain model.
 fn diagnosis(over: Coordinate, error_px: impl Fn(usize) -> f64) -> Diagnosed {
     let nodes = if over == Coordinate::Row { SIZE[1] } else { SIZE[0] };
     let high = nodes as f64 - 1.0;
@@ -40,9 +40,9 @@ fn diagnosis(over: Coordinate, error_px: impl Fn(usize) -> f64) -> Diagnosed {
     diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ()).expect("diagnosed")
 }
 
-/// Two read-outs, one for even lines and one for odd: smooth curves see nothing of it, even where it is a few
-/// ten-thousandths of the noise's variance. Of one thirty times as high nothing is left either, and it makes no
-/// tails; views that had no part are predicted better by about as much as lines of that height are worth.
+/// Two read-outs, one for even lines and one for odd: smooth curves cannot see them, but they are found even
+/// at a few ten-thousandths of the noise's variance. At thirty times that height nothing is left either, and
+/// no tails are found; held-out views are predicted better by about what lines of that height are worth.
 #[test]
 fn lines_of_two_readouts_are_seen_and_learnt() {
     let columns = (Coordinate::Column, Axis::Column);
@@ -60,7 +60,7 @@ fn lines_of_two_readouts_are_seen_and_learnt() {
         let held = said.heldout.as_ref().expect("views kept aside");
         assert!(held.gain_interval[0] > 0.0, "{:?}", held.gain_interval);
         let less_px2 = held.correction_rms_before_px.powi(2) - held.correction_rms_after_px.powi(2);
-        // The noise, .02 px, of all readings that were kept aside hides the gain of low ones.
+        // The noise, .02 px, of all held-out readings hides the gain of low ones.
         if height_px > 1e-3 {
             let noise_px = 0.02 / f64::sqrt((3 * 6 * SIZE[0] * SIZE[1]) as f64);
             let tolerance = 5.0 * 2.0 * height_px * noise_px + 2.5e-4f64.powi(2);
@@ -75,14 +75,14 @@ fn lines_of_two_readouts_are_seen_and_learnt() {
     }
 }
 
-/// In half of the views, and in three quarters: the noise has its name, and where a tilted target's disparity goes
-/// with the row it is no error of the mean.
+/// In half of the views and in three quarters: the noise is named, and it is no bias, even where a tilted
+/// target's disparity changes with the row.
 #[test]
 fn rows_that_err_afresh_in_a_part_of_the_views_are_row_noise_and_no_bias() {
     let effect = Active::parse("row-noise:sigma_px=0.03").expect("an effect");
     let (_noisy, noisy) = wall(vec![effect]);
     let (_plain, plain) = wall(Vec::new());
-    // Of three quarters the mean over all views is told: of the variance, .75.
+    // In three quarters of the views the mean over all views is reported: .75 of the variance.
     for (some, told_px) in [(6, 0.03), (9, 0.026)] {
         let views = noisy.views[..some].iter().chain(&plain.views[some..]).cloned().collect();
         let recording = Recording { views, ..plain.clone() };

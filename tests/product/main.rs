@@ -1,8 +1,8 @@
-//! The product's tests: a module a subject, seconds each. What simulates hundreds of recordings or
-//! diagnoses whole families of causes is in tests/slow.
+//! The product's tests, a module per subject, seconds each. Tests that simulate hundreds of recordings or
+//! diagnose whole families of causes are in tests/slow.
 //!
-//! Every random number is seeded, so a test that passes once passes always; a false-alarm
-//! probability says how often correct code would fail under another seed.
+//! All random numbers are seeded, so the tests are deterministic; false-alarm probabilities say how often
+//! correct code would fail under another seed.
 
 #![forbid(unsafe_code)]
 

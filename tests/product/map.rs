@@ -1,4 +1,4 @@
-//! `kinoise map` on films of the simulated office: what it finds, and what it says of bad ones.
+//! `kinoise map` on films of the simulated office: its results, and its reports on bad films.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use kinoise::simulate::room::{Film, Pose, Room, around_the_desks};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 use nalgebra::Isometry3;
 
-/// A film of 160 x 120 px along some poses.
+/// Writes a film of 160 x 120 px along the poses.
 pub fn film(root: &Path, poses: Vec<Pose>) -> PathBuf {
     let film = Film {
         sensor: Film::kinect(4),
@@ -31,7 +31,7 @@ fn some(n: usize) -> Vec<Pose> {
     around_the_desks().into_iter().take(n).collect()
 }
 
-/// Blocks of 2 px: as many points as these small pictures have.
+/// Blocks of 2 px: as many points as these small images have.
 pub fn best() -> Options {
     Options { block_px: 2, ..Options::best() }
 }
@@ -67,7 +67,7 @@ fn poses_in(out: &Path) -> usize {
     text.lines().filter(|l| !l.starts_with('#')).count()
 }
 
-/// The whole road, and the order of the methods: aligned to the map it drifts least.
+/// The full pipeline, and the ranking of the methods: alignment to the map drifts least.
 #[test]
 fn a_walk_through_the_office_is_followed() {
     let dir = tempfile::tempdir().unwrap();
@@ -111,7 +111,7 @@ fn outputs_are_whole_and_start_at_the_identity() {
     }
 }
 
-/// The same bytes, whatever the threads.
+/// The bytes do not depend on the number of threads.
 #[test]
 fn threads_change_nothing() {
     let dir = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn threads_change_nothing() {
     }
 }
 
-/// A damaged file in the middle costs its own frame only.
+/// A damaged image costs its own frame only.
 #[test]
 fn a_damaged_image_is_told_and_passed_over() {
     let dir = tempfile::tempdir().unwrap();
@@ -157,7 +157,7 @@ fn damaged_colour_costs_no_pose() {
     assert_eq!(poses_in(&out), 6);
 }
 
-/// Nothing measured anywhere: a failure that says so.
+/// No depth at all is a failure that says so.
 #[test]
 fn empty_depth_is_no_map() {
     let dir = tempfile::tempdir().unwrap();
@@ -174,7 +174,7 @@ fn empty_depth_is_no_map() {
     }
 }
 
-/// A camera that does not move is told, and so is a driver that repeats itself.
+/// A camera that does not move is reported, and so is a driver that repeats frames.
 #[test]
 fn a_frozen_camera_is_told() {
     let dir = tempfile::tempdir().unwrap();
@@ -191,7 +191,7 @@ fn a_frozen_camera_is_told() {
     assert!(said.contains("the camera never moved"), "{said}");
 }
 
-/// The camera is lifted and put down a metre aside and turned: lost, told, and what was mapped kept.
+/// A camera lifted and put down a metre aside and turned is lost and reported; the map so far is kept.
 #[test]
 fn a_jump_is_told_and_the_path_before_it_kept() {
     let dir = tempfile::tempdir().unwrap();
@@ -211,7 +211,7 @@ fn a_jump_is_told_and_the_path_before_it_kept() {
     }
 }
 
-/// A metre aside without a turn: floor and walls still find neighbours, but far fewer than before.
+/// A metre aside without a rotation: floor and walls still find neighbours, but far fewer than before.
 #[test]
 fn a_bare_jump_is_told_too() {
     let dir = tempfile::tempdir().unwrap();
@@ -233,8 +233,8 @@ fn a_bare_jump_is_told_too() {
     }
 }
 
-/// The sensor's word for nothing in raw disparity, 2047, is NaN inside: whole images of it, and
-/// images with holes of it, are told or passed over.
+/// The invalid word of raw disparities, 2047, is NaN inside: images full of it are reported, holes are
+/// skipped.
 #[test]
 fn words_for_nothing_make_no_poses() {
     let dir = tempfile::tempdir().unwrap();
@@ -270,7 +270,7 @@ fn words_for_nothing_make_no_poses() {
     assert_eq!(poses_in(&out), 5);
 }
 
-/// A bare wall fills every picture: the motion along it is not determined, and that is said.
+/// A bare wall fills every image: the motion along it is not determined, and this is reported.
 #[test]
 fn a_bare_wall_is_told() {
     let dir = tempfile::tempdir().unwrap();

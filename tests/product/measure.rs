@@ -9,28 +9,28 @@ use kinoise::{Frame, Plane, Seed, Sensor};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// What a frame's error is made of, m.
+/// Components of a frame's error, m.
 #[derive(Clone, Copy, Default)]
 struct Noise {
-    /// Fresh in every pixel and frame.
+    /// Independent in every pixel and frame.
     temporal: f64,
-    /// Fresh in every pixel, the same in all frames.
+    /// Independent in every pixel, the same in all frames.
     frozen: f64,
-    /// The whole frame as one.
+    /// Common to the whole frame.
     jitter: f64,
-    /// Moving average over this many pixels each way (0 = none), the variance kept.
+    /// Moving average over this many pixels in each direction (0 = none), with the same variance.
     window: usize,
     /// Share of pixels with a gross error of up to 0.3 m.
     gross: f64,
-    /// First-order correlation from frame to frame of the temporal part.
+    /// First-order autocorrelation over frames of the temporal part.
     filter: f64,
-    /// The sensor's own steps, coarser than the file's (0 = none).
+    /// Quantisation step of the sensor, coarser than the file's (0 = none).
     step: f64,
-    /// What the target moves away by from frame to frame.
+    /// Motion of the target away from the camera per frame.
     drift: f64,
-    /// This frame shows something half a metre behind.
+    /// Index of a frame that shows a plane half a metre behind.
     stale: Option<usize>,
-    /// Times that each frame is stored again.
+    /// Number of additional copies stored of each frame.
     copies: usize,
 }
 
@@ -131,8 +131,8 @@ fn near(value: f64, truth: f64, share: f64, what: &str) {
     assert!((value / truth - 1.0).abs() < share, "{what}: {value:.6} for {truth:.6}");
 }
 
-/// 19,200 pixels: the standard error of a white sigma is 0.5 %; 2.5 % is five of them
-/// (false alarm below 1e-5 a comparison).
+/// 19,200 pixels: the standard error of sigma for white noise is 0.5 %; 2.5 % is five of them (false alarm
+/// probability below 1e-5 per comparison).
 #[test]
 fn frozen_and_temporal_noise_are_told_apart() {
     for (temporal, frozen) in [(0.004, 0.0), (0.003, 0.004), (0.001, 0.005)] {
@@ -146,16 +146,16 @@ fn frozen_and_temporal_noise_are_told_apart() {
     }
 }
 
-/// A Kinect's driver stores millimetres of what steps by an eighth of a pixel. Of a wall that is faced squarely
-/// two thirds are one step, a sixth each the next: their deviation is 0.570 steps (the normal's shares within
-/// 1, 3 and 5 sigma).
+/// A Kinect's driver stores millimetres although the disparity has steps of an eighth of a pixel. On a
+/// frontal wall two thirds of the pixels are at one step and a sixth at each neighbour: their standard
+/// deviation is 0.570 steps (the normal distribution's shares within 1, 3 and 5 sigma).
 #[test]
 fn steps_coarser_than_the_file_are_no_gross_errors() {
     let step = 0.00625;
     let noise = Noise { temporal: 0.5 * step, step, ..Noise::default() };
     for theta in [0.0, 0.001, 0.3] {
         let m = measured(&Plane::tilted(1.5, theta, 0.4), &noise, 6, 5, Planes::PerView);
-        // Where the steps are met at all phases their own deviation is a uniform's.
+        // Where all phases of the steps occur, they add the variance of a uniform distribution.
         let truth = if theta < 0.01 { 0.5704 } else { (0.25f64 + 1.0 / 12.0).sqrt() };
         near(m.whole.spread.total_m, truth * step, 0.025, "total");
     }
@@ -172,7 +172,7 @@ fn what_trembles_as_a_whole_is_in_the_total_only_and_goes_with_a_plane_a_frame()
     near(own.whole.spread.total_m, 0.003, 0.025, "total");
 }
 
-/// Over 30 frames three of its sigmas: a cut that stood still took 4 % off.
+/// The drift over 30 frames is three times sigma: regression test, a fixed cut lost 4 % of sigma.
 #[test]
 fn a_drift_does_not_narrow_sigma_and_is_told() {
     let noise = Noise { temporal: 0.003, drift: 0.0003, ..Noise::default() };
@@ -183,7 +183,7 @@ fn a_drift_does_not_narrow_sigma_and_is_told() {
     near(own.whole.spread.spatial_m, 0.003, 0.015, "spatial, a plane a frame");
 }
 
-/// Among the first frames, which find the target, and among the others.
+/// Tests a stale frame among the first frames, which locate the target, and among the others.
 #[test]
 fn a_stale_frame_is_left_out_and_named() {
     for stale in [0, 3, 10] {
@@ -227,9 +227,9 @@ fn a_temporal_filter_is_measured() {
     assert!(m.whole.n_effective < 0.6 * white.whole.n_effective);
 }
 
-/// Six frames of a first-order filter with rho = 0.6 spread about their own mean by 0.72 of the
-/// true standard deviation: uncorrected this fails by far. The measured rho (standard error about
-/// 0.01 from 19,200 pixels) leaves 1.5 %; 6 % is four of them.
+/// Six frames of a first-order filter with rho = 0.6 spread about their own mean by 0.72 of the true standard
+/// deviation: uncorrected, the test fails by far. The measured rho (standard error about 0.01 from 19,200
+/// pixels) leaves 1.5 %; 6 % is four of them.
 #[test]
 fn a_filtered_pixel_has_its_true_temporal_sigma_over_few_frames() {
     let noise = Noise { temporal: 0.004, filter: 0.6, ..Noise::default() };
@@ -237,8 +237,8 @@ fn a_filtered_pixel_has_its_true_temporal_sigma_over_few_frames() {
     near(m.whole.spread.temporal_m.unwrap(), 0.004, 0.06, "temporal");
 }
 
-/// What neighbours share by their window is noise of the frame, and is not taken out with what a
-/// frame shares as a whole: 20 seeds of 5 frames, whose mean has a standard error of 0.6 %.
+/// Noise shared by neighbours within a window is noise of the frame, and must not be removed with the
+/// frame's common error: 20 seeds of 5 frames, whose mean has a standard error of 0.6 %.
 #[test]
 fn correlated_noise_of_several_frames_keeps_its_spatial_sigma() {
     let noise = Noise { temporal: 0.004, window: 9, ..Noise::default() };
@@ -249,9 +249,9 @@ fn correlated_noise_of_several_frames_keeps_its_spatial_sigma() {
     near(mean, 0.004, 0.02, "mean over seeds");
 }
 
-/// The claimed standard error of sigma against its scatter over 60 seeds, white and with a 5 px
-/// window, one frame. The scatter of a scatter from 60 is 9 %; a ratio outside 0.65 to 1.5 has a
-/// false alarm below 1e-4.
+/// The claimed standard error of sigma, compared with its scatter over 60 seeds, for white noise and a 5 px
+/// window, one frame. The scatter over 60 is known to 9 %; a ratio outside 0.65 to 1.5 has a false alarm
+/// probability below 1e-4.
 #[test]
 fn the_standard_error_is_the_scatter_over_seeds() {
     for window in [0, 5] {
@@ -266,7 +266,7 @@ fn the_standard_error_is_the_scatter_over_seeds() {
         let claimed = runs.iter().map(|m| m.whole.std_error_m).sum::<f64>() / n;
         let ratio = claimed / scatter;
         assert!((0.65..1.5).contains(&ratio), "window {window}: claimed / scatter = {ratio:.2}");
-        // Bias: three parameters fitted, tails cut, correlation or not.
+        // Bias: three fitted parameters, cut tails, with and without correlation.
         near(mean, 0.004, 0.006, "mean over seeds");
     }
 }
@@ -289,7 +289,7 @@ fn a_tilted_view_is_cut_into_bins_that_follow_sigma() {
     near(m.whole.spread.perpendicular_m / m.whole.spread.spatial_m, 1f64.cos(), 0.25, "cos(theta)");
 }
 
-/// The plane itself against the truth, over tilts: errors in units of what the noise allows.
+/// Planes agree with the truth within their noise, over tilts.
 #[test]
 fn planes_come_back_within_their_noise() {
     for (k, theta) in [0.0, 0.3, 0.8, 1.2].into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The vendors' figures against an oracle of their own, written in numpy from the tool's readme.
+//! The vendors' figures, compared with an independent numpy version written from the tool's readme.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::export_programs::{python_with, run};
 use crate::common::{good, kinoise};
 
-/// Distances, the plane by its normal equations in z, errors: all of one frame of one view.
+/// Computes distances, the plane by its normal equations in z, and errors of every frame of the given views.
 const ORACLE: &str = "
 import json, os, sys, zlib, struct
 import numpy as np
@@ -93,7 +93,7 @@ fn the_figures_are_the_tools() {
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .collect();
     names.sort();
-    // A region that a far tilted board does not quite fill; a tape that says the same everywhere.
+    // A region that a far tilted board does not quite fill, and the same reference distance everywhere.
     for name in &names {
         let path = recording.join(name).join("view.json");
         let text = std::fs::read_to_string(&path).unwrap_or("{}".into());
@@ -133,7 +133,7 @@ fn the_figures_are_the_tools() {
     assert_eq!(serde_json::from_str::<Value>(&file).expect("JSON"), found);
 }
 
-/// To a millionth.
+/// Asserts equality to a relative error of 1e-6.
 fn near(view: &str, key: &str, found: &Value, truth: &Value) {
     let [a, b] = [found, truth].map(|v| v.as_f64().unwrap_or(f64::NAN));
     assert!((a - b).abs() <= 1e-6 * b.abs(), "{view} {key}: {a}, not {b}");

@@ -1,4 +1,4 @@
-//! Models that must not be believed, and what a model says of its own trust.
+//! Models that must be refused, and what a model states about its own reliability.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::common;
 
-/// A good model.json, made by the program from a table.
+/// A valid model.json, fitted by the program to a table.
 fn model_json(folder: &Path) -> Value {
     let table = folder.join("table.csv");
     let rows = (0..20).map(|i| {
@@ -31,7 +31,7 @@ fn truth(z: f64, theta: f64) -> f64 {
     Form::Paper.spec().sigma(&PAPER_EQ1, z, theta)
 }
 
-/// Each lie in a file that is right in everything else; the message names the file and the fault.
+/// A single wrong value in an otherwise valid file; the message names the file and the fault.
 #[test]
 fn a_model_with_one_lie_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -41,7 +41,7 @@ fn a_model_with_one_lie_is_refused() {
     write(&good);
     NoiseModel::read(&path).expect("the good model is read");
     let lies: [(&str, Value, &str); 13] = [
-        // Positive at both ends of the range, negative in the middle.
+        // Positive at both ends of the range, negative in between.
         ("/sigma/parameters/c/value", json!(2.5), "not positive"),
         ("/sigma/parameters/a/value", json!(-1.0), "not positive"),
         ("/sigma/parameters/d/value", json!(-1.0), "not positive"),
@@ -68,7 +68,7 @@ fn a_model_with_one_lie_is_refused() {
     }
 }
 
-/// A dip below zero between two distances is not fitted either.
+/// A fit does not dip below zero between two distances either.
 #[test]
 fn a_fit_stays_positive_between_its_distances() {
     let sigma = |z: f64| (0.004 * (z - 2.5).powi(2) - 0.0005).max(1e-4);
@@ -92,7 +92,7 @@ fn a_fit_stays_positive_between_its_distances() {
     }
 }
 
-/// Depth noise of a model of distances across the plane is 1/cos(theta) of them.
+/// The depth noise of a perpendicular model is 1/cos(theta) times its sigma.
 #[test]
 fn a_perpendicular_model_gives_axial_noise() {
     let axial = SigmaModel::paper();
@@ -102,11 +102,11 @@ fn a_perpendicular_model_gives_axial_noise() {
         assert!((ratio * theta.cos() - 1.0).abs() < 1e-12, "{theta}");
         assert_eq!(axial.axial_sigma(2.0, theta), axial.sigma(2.0, theta));
     }
-    // Beyond the domain it stays at the edge and below infinity.
+    // Beyond the domain it is held at the edge, and finite.
     assert_eq!(across.axial_sigma(2.0, 1.57), across.axial_sigma(2.0, across.domain.theta_rad[1]));
 }
 
-/// The loop closes: noise shot from a perpendicular model is measured as that model says.
+/// Noise simulated from a perpendicular model is measured as that model says.
 #[test]
 fn a_simulation_from_a_perpendicular_model_measures_as_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -124,20 +124,20 @@ fn a_simulation_from_a_perpendicular_model_measures_as_one() {
     };
     let theta = 60f64.to_radians();
     let along = mean(&|c| c.spread.spatial_m * theta.cos() / truth(c.z_m, theta));
-    // Across the plane an error along the ray is cos(theta) of it at the axis, and z0/z times that
-    // where the ray meets the plane at depth z (kinoise::residual).
+    // Across the plane, an error along the ray is cos(theta) of it on the axis, and z0/z times that where the
+    // ray meets the plane at depth z (kinoise::residual).
     let across = mean(&|c| c.spread.perpendicular_m * (c.z_m / 1.5) / truth(c.z_m, theta));
     assert!((along - 1.0).abs() < 0.03 && (across - 1.0).abs() < 0.03, "{along} {across}");
 }
 
-/// Distances left out are predicted as surely as the form says: the mean squared error, in
-/// predicted variances that hold the surface's own uncertainty, is one.
+/// Held-out distances are predicted as well as claimed: the mean squared error in units of the predicted
+/// variance, which includes the surface's own uncertainty, is one.
 #[test]
 fn predictions_know_how_sure_they_are() {
     let mut rng = Seed(41).stream("held out");
     let mut chi2 = Vec::new();
-    // The scatter is found from the table: were n to explain it, the estimate of what is beyond n
-    // could only err upwards.
+    // The scatter is estimated from the table: if n explained it, the estimated excess over n could only err
+    // upwards.
     for _ in 0..200 {
         let mut rows = Vec::new();
         for i in 0..8 {
@@ -182,7 +182,7 @@ fn two_views_are_no_calibration() {
     assert!(words.contains("no calibration: a surface through 2 views"), "{words}");
 }
 
-/// A real recording (33 rooms and boards) whose sigmas no smooth surface follows.
+/// A real recording (33 rooms and boards) whose sigmas follow no smooth surface.
 #[test]
 fn a_poor_fit_says_so_in_words() {
     let Some(root) = common::data("kinect-v1-second-unit") else { return };
@@ -202,7 +202,7 @@ fn a_poor_fit_says_so_in_words() {
     assert!(page.contains("The fit does not describe this sensor"));
 }
 
-/// Commands print folders, and people give them.
+/// Commands print folders, so users give folders.
 #[test]
 fn a_folder_stands_for_the_model_in_it() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -1,5 +1,5 @@
-//! Held against a model that other views of the sensor taught: the same sensor is no mismatch, and one
-//! that has changed is.
+//! Diagnosis against a model learnt from other views of the sensor: an unchanged sensor is no mismatch, and a
+//! changed one is.
 
 use kinoise::diagnose::{DiagnoseOptions, Verdict, diagnose};
 use kinoise::effects::Active;
@@ -10,7 +10,7 @@ use kinoise::{
 };
 use tempfile::TempDir;
 
-/// A bowl three times as deep as the noise of so small a sensor: deeper, a wall is not flat.
+/// A bowl three times the noise of so small a sensor: with a deeper one the wall is not flat.
 const SENSOR: [&str; 2] = ["radial-disparity-bias:k_px=0.05", "vignetting:growth=0.4"];
 
 /// Fifteen views of a wall by a small Kinect with these effects.
@@ -27,7 +27,7 @@ fn views(effects: &[&str], seed: u64) -> (TempDir, Recording) {
     (folder, recording)
 }
 
-/// Calibrated on views of the sensor, and what is beyond sigma found there.
+/// A model calibrated and extended by a diagnosis on views of the sensor.
 fn learnt() -> NoiseModel {
     let (_folder, recording) = views(&SENSOR, 1);
     let options = CalibrateOptions::default();
@@ -38,7 +38,7 @@ fn learnt() -> NoiseModel {
     assert!(found.model.effects.iter().any(|e| e.id == "radial-disparity-bias"));
     let shaped = || found.model.effects.iter().filter(|e| !e.shape.is_empty());
     assert!(shaped().all(|e| e.between_views.len() == e.shape.len()));
-    // These views come from one sensor that never changes: what was injected is alike in all.
+    // These views come from one sensor that never changes: the injected effects are the same in all.
     let first = |e: &kinoise::model::Effect| e.between_views[0];
     let injected = shaped().filter(|e| SENSOR.iter().any(|s| s.starts_with(&e.id)));
     let scatter: Vec<_> = injected.map(|e| (e.id.clone(), first(e))).collect();
@@ -76,9 +76,8 @@ fn a_sensor_is_itself_and_a_changed_one_is_not() {
     }
 }
 
-/// Against a model whose sigma is too large nothing but sigma is off: what views weigh is relative to it,
-/// and once it is refitted white noise is white noise. Weights that were taken over as they stood made them four
-/// times as heavy as they are.
+/// Against a model whose sigma is too large, only sigma is off: views are weighted relative to it, and after
+/// a refit white noise is white. Regression test: unadjusted weights made views count four times too much.
 #[test]
 fn a_sigma_that_was_too_large_leaves_nothing_once_it_is_refitted() {
     let paper = NoiseModel::paper();

@@ -1,4 +1,4 @@
-//! Outliers put in at random places: found, and none seen where there are none.
+//! Outliers at random rows: they are found, and none are found where there are none.
 
 use kinoise::measure::{SigmaRow, SigmaTable};
 use kinoise::model::{PAPER_EQ1, compare_forms, fit, sort_out};
@@ -7,8 +7,8 @@ use kinoise::{Form, Seed};
 use rand::seq::index::sample;
 use rand_distr::{Distribution, StandardNormal};
 
-/// 30 rows of Eq. 1: six distances, five tilts, each off by `noise` (relative); `counted` says so
-/// in n_effective.
+/// 30 rows of Eq. 1: six distances, five tilts, with relative errors of size `noise`; if `counted`,
+/// n_effective states that size.
 fn table(noise: f64, counted: bool, rng: &mut Stream) -> SigmaTable {
     let mut rows = Vec::new();
     for i in 0..6 {
@@ -29,7 +29,7 @@ fn table(noise: f64, counted: bool, rng: &mut Stream) -> SigmaTable {
     SigmaTable { rows }
 }
 
-/// Multiply `count` random rows by `size`; which.
+/// Multiplies `count` random rows by `size`; returns these rows.
 fn spoil(table: &mut SigmaTable, size: f64, count: usize, rng: &mut Stream) -> Vec<SigmaRow> {
     let at = sample(rng, table.rows.len(), count).into_vec();
     at.iter().for_each(|&i| table.rows[i].sigma_m *= size);
@@ -38,9 +38,9 @@ fn spoil(table: &mut SigmaTable, size: f64, count: usize, rng: &mut Stream) -> V
 
 const TABLES: usize = 40;
 
-/// Of 1 to 4 outliers among 30 rows with 5 % noise: every factor 30 and 1000 and its inverse in at
-/// least 99 of 100 tables, and 95 of 100 with a factor 3. What remains is a row alone at the end of
-/// the range (4 m, 75 degrees), which the six coefficients can follow.
+/// 1 to 4 outliers among 30 rows with 5 % noise: a factor of 30 or 1000 or its inverse is found in at least
+/// 99 of 100 tables, a factor of 3 in 95 of 100. A missed one is a row alone at the end of the range (4 m,
+/// 75 degrees), which the six coefficients can follow.
 #[test]
 #[ignore = "slow: sixteen hundred tables"]
 fn outliers_of_any_size_are_found() {
@@ -69,9 +69,8 @@ fn outliers_of_any_size_are_found() {
     }
 }
 
-/// A table counts as a false alarm when one row of its 30 is left out: below 2 % without n (0.4 %
-/// measured over 4,000; that gives nine or more of 400 once in ten thousand),
-/// never with n.
+/// A table that loses any of its 30 rows is a false alarm: below 2 % without n (0.4 % measured over 4,000;
+/// at that rate nine or more of 400 occur once in ten thousand), never with n.
 #[test]
 fn clean_tables_lose_no_row() {
     let mut rng = Seed(32).stream("clean");
@@ -86,7 +85,7 @@ fn clean_tables_lose_no_row() {
     }
 }
 
-/// A whole view of something else: eight cells of one view, forty times too large.
+/// A whole view of something else: its eight cells are forty times too large.
 #[test]
 fn a_view_of_something_else_is_left_out_whole() {
     let mut rng = Seed(33).stream("view");
@@ -105,8 +104,7 @@ fn a_view_of_something_else_is_left_out_whole() {
     assert!(sorted.left_out.iter().all(|r| r.view == 4));
 }
 
-/// The surface is that of the good rows, whatever form is asked for; and forms are compared on
-/// the good rows.
+/// Fits of any form, and the comparison of the forms, use the good rows only.
 #[test]
 fn outliers_pull_no_form_and_no_comparison() {
     let mut rng = Seed(34).stream("pull");
@@ -126,7 +124,7 @@ fn outliers_pull_no_form_and_no_comparison() {
     assert_eq!(scores[0].form, Form::Paper, "{scores:?}");
 }
 
-/// Two populations are no outliers: nothing is left out, and the fit is called what it is.
+/// Two populations are no outliers: nothing is left out, and the fit is reported as poor.
 #[test]
 fn a_third_of_the_rows_is_no_outlier() {
     let mut rng = Seed(35).stream("third");

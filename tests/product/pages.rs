@@ -1,5 +1,5 @@
-//! Every page in a headless browser: nothing on its console, nothing loaded, nothing cut at 400 px,
-//! points and tables and pictures answering, in light and in dark. Skipped where there is no browser.
+//! Every page in a headless browser: nothing on its console, nothing loaded from elsewhere, nothing cut off
+//! at 400 px, working points, tables and pictures, in light and dark mode. Skipped without a browser.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ const BROWSERS: [&str; 4] =
 const SCRIPT: &str = include_str!("pages.js");
 const SLOW: &str = "GL Driver Message (OpenGL, Performance";
 
-/// The first that is on the PATH, or `None` with a line that says what was skipped.
+/// The first browser on the PATH; `None`, with a printed line, if there is none.
 fn browser() -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
@@ -26,7 +26,7 @@ fn browser() -> Option<PathBuf> {
     found
 }
 
-/// What the browser finds wrong with pages, by name and text, and which of them it has looked at.
+/// Faults that the browser finds in pages (name and text), and which pages it looked at.
 fn looked_at(browser: &Path, pages: &[(String, String)], dark: bool) -> (Vec<String>, Vec<String>) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let json = serde_json::to_string(pages).expect("text").replace("</", "<\\/");
@@ -53,7 +53,7 @@ fn looked_at(browser: &Path, pages: &[(String, String)], dark: bool) -> (Vec<Str
     let result = result.map_or("", |(text, _)| text);
     let (seen, mut faults): (Vec<String>, Vec<String>) =
         result.lines().map(String::from).partition(|line| line.starts_with("looked at"));
-    // Without a graphics card the browser copies each picture of WebGL, and remarks that it is slow.
+    // Without a graphics card the browser copies each WebGL image and warns that this is slow.
     let said = |line: &&str| line.contains(":CONSOLE") && !line.contains(SLOW);
     let stderr = String::from_utf8_lossy(&output.stderr);
     faults.extend(stderr.lines().filter(said).map(String::from));
@@ -67,7 +67,7 @@ fn run(folder: &Path, arguments: &[&str]) {
     assert!(output.status.code().is_some_and(|code| code < 2), "{arguments:?}: {stderr}");
 }
 
-/// A page of each kind; and those of KINOISE_PAGES, a list of files like a PATH.
+/// A page of each kind, and those in KINOISE_PAGES, a list of files in the format of PATH.
 fn pages(folder: &Path) -> Vec<(String, String)> {
     let recording = good().to_str().expect("a plain path");
     run(folder, &["calibrate", recording, "-o", "calibrated"]);
@@ -104,7 +104,7 @@ fn pages(folder: &Path) -> Vec<(String, String)> {
 fn every_page_is_clean_at_both_widths_in_light_and_dark() {
     let Some(browser) = browser() else { return };
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // Pages name the recording: a path that has nowhere to break must not widen them.
+    // Pages show the recording's path: one without break points must not widen them.
     let long = folder.path().join("recordings_of_a_single_long_word_".repeat(3));
     fs::create_dir(&long).expect("made");
     let pages = pages(&long);
@@ -115,7 +115,7 @@ fn every_page_is_clean_at_both_widths_in_light_and_dark() {
     }
 }
 
-/// The look finds what it is for.
+/// The check itself finds faults.
 #[test]
 fn a_spoilt_page_is_told() {
     let Some(browser) = browser() else { return };

@@ -1,4 +1,4 @@
-//! A sensor that stores the range for the depth, before a board that fills most of a near picture.
+//! A sensor that stores the range as depth, in front of a board that fills most of a near image.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use kinoise::view::Recording;
 use kinoise::{NoiseModel, Seed, SigmaModel};
 use serde_json::json;
 
-/// Of a board before a wall, from near and far, with so much of the range in place of the depth: fifteen views.
+/// Fifteen near and far views of a board in front of a wall; `share` of the range replaces the depth.
 fn recording(folder: &Path, share: f64) -> Recording {
     let poses =
         Grid { distances_m: vec![0.9, 1.0, 1.2, 2.4, 3.0], tilts_rad: vec![0.0, 0.4, 0.7] }.views();
@@ -31,31 +31,31 @@ fn diagnosis(recording: &Recording, model: &NoiseModel) -> Diagnosed {
     diagnose(recording, model, &DiagnoseOptions::default(), &|_, _| ()).expect("diagnosed")
 }
 
-/// Read as depths, most of the nine near views hold no plane at all: the range bends the board by 15 % of
-/// its distance towards its corners. As ranges all fifteen do, and nothing else is wrong with them.
+/// Read as depths, most of the nine near views have no plane at all: the range bends the board by 15 % of its
+/// distance towards its corners. Read as ranges all fifteen do, and nothing else is wrong with them.
 #[test]
 fn views_that_are_flat_as_ranges_alone_tell_ranges() {
     let folder = tempfile::tempdir().expect("a folder");
     let recording = recording(folder.path(), 1.0);
     let done = diagnosis(&recording, &NoiseModel::paper());
     let said = &done.diagnosis;
-    // The simulated noise is that of the depth which is stored: a little more than the model's.
+    // The simulated noise is that of the stored depth: a little larger than the model's.
     let large = |f: &&Finding| f.status != Status::NotIdentifiable && !f.minor;
     let told = said.findings.iter().filter(large);
     assert_eq!(told.map(|f| f.effect).collect::<Vec<_>>(), [Some("range-not-depth")]);
     assert_eq!(said.after.verdict, Verdict::Match, "{:?}", said.after.remaining);
     assert_eq!(said.views.len(), 15);
-    // What reading as ranges is worth is told beside the rest: the means are bent as they are stored.
+    // The held-out gain includes that of reading as ranges: the stored means are bent.
     let aside = said.heldout.as_ref().expect("views kept aside");
     assert!(aside.gain_interval[0] > 0.0, "{:?}", aside.gain_interval);
     let nearest = &said.views[0];
     assert!(nearest.bowl_px_after < 0.1 * nearest.bowl_px_before, "{nearest:?}");
-    // A model that has the ranges finds the near boards, and nothing more to say of them.
+    // A model with the ranges finds the near boards, and no further findings.
     let again = diagnosis(&recording, &done.model).diagnosis;
     assert_eq!((again.verdict, again.views.len()), (Verdict::Match, 15), "{:?}", again.findings);
 }
 
-/// A model that takes depths for ranges is wrong about every view, and loses none.
+/// A model that takes depths for ranges is wrong in every view, but no view is lost.
 #[test]
 fn a_model_that_is_wrong_about_ranges_finds_all_targets() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -69,7 +69,7 @@ fn a_model_that_is_wrong_about_ranges_finds_all_targets() {
     assert!((share + 1.0).abs() < 0.1, "{share}");
 }
 
-/// `calibrate` reads depths: it says that the views it left out would be flat as ranges.
+/// `calibrate` reads depths, and says that the views it left out would be flat as ranges.
 #[test]
 fn a_calibration_says_what_its_views_are_flat_as() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -80,7 +80,7 @@ fn a_calibration_says_what_its_views_are_flat_as() {
     assert!(warnings[0].contains("taken for ranges"), "{warnings:?}");
 }
 
-/// What is neither range nor depth is told with its share, by the views that are flat enough.
+/// A mixture of range and depth is reported with its share, from the views that are flat enough.
 #[test]
 fn a_part_of_the_range_is_no_range() {
     let folder = tempfile::tempdir().expect("a folder");

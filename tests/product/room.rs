@@ -1,5 +1,5 @@
-//! The filmed office: geometry against oracles that share no code with it, ground truth against
-//! the pictures, paths against the furniture, and the folder that is written.
+//! The filmed office: geometry against independent oracles, ground truth against the images, paths against
+//! the furniture, and the written folder.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,19 +19,19 @@ use rand::Rng;
 
 use crate::common;
 
-/// A body alone, white.
+/// A room with a single white body.
 fn alone(shape: Shape, room_from_body: Isometry3<f64>) -> Room {
     let materials = [Material::new(0, Mapping::Fit); Shape::FACES];
     let textures = vec![Texture::new(1, vec![[255; 3]])];
     Room { bodies: vec![Body { shape, room_from_body, materials }], textures }
 }
 
-/// A ray of the room's own frame.
+/// Casts a ray given in the room's frame.
 fn cast(room: &Room, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit> {
     PosedRoom { room, room_from_camera: Isometry3::identity() }.cast(origin, direction)
 }
 
-/// Is a point inside? By each body's definition.
+/// Whether a point is inside the body, by the definition of its shape.
 fn inside(shape: &Shape, room_from_body: &Isometry3<f64>, point: &Vector3<f64>) -> bool {
     let p = room_from_body.inverse_transform_point(&Point3::from(*point));
     match *shape {
@@ -42,7 +42,7 @@ fn inside(shape: &Shape, room_from_body: &Isometry3<f64>, point: &Vector3<f64>) 
     }
 }
 
-/// Walk until inside, then halve: no formula of a ray.
+/// Finds the entry point by stepping and bisection, without a formula for the ray.
 fn walk(enters: impl Fn(f64) -> bool) -> Option<f64> {
     const STEP: f64 = 0.002;
     let mut high = (1..4000).map(|k| f64::from(k) * STEP).find(|t| enters(*t))?;
@@ -79,7 +79,7 @@ fn rays_end_where_a_walk_along_them_first_comes_inside() {
                 let truth = walk(|t| inside(&shape, &pose, &(origin + t * direction)));
                 let hit = cast(&room, &origin, &direction);
                 let Some(truth) = truth else {
-                    // The walk may step over a corner, never over more.
+                    // The walk may step over a corner, but over nothing larger.
                     assert!(hit.is_none_or(|h| {
                         let deeper = origin + (h.t + 0.004) * direction;
                         !inside(&shape, &pose, &deeper)
@@ -88,7 +88,7 @@ fn rays_end_where_a_walk_along_them_first_comes_inside() {
                 };
                 let hit = hit.expect("the walk came inside");
                 assert!((hit.t - truth).abs() < 2e-3, "{shape:?}: {} {truth}", hit.t);
-                // Stepping over a first corner aside, the two agree to the halving's end.
+                // Unless the walk stepped over a corner, the two agree to the precision of the bisection.
                 met += usize::from((hit.t - truth).abs() < 1e-9);
                 assert!((hit.normal.norm() - 1.0).abs() < 1e-12);
                 assert!(hit.normal.dot(&direction) < 0.0, "towards where the ray came from");
@@ -100,7 +100,7 @@ fn rays_end_where_a_walk_along_them_first_comes_inside() {
     }
 }
 
-/// Depths that a person finds with a ruler.
+/// Depths that can be checked by hand.
 #[test]
 fn known_bodies_have_known_depths() {
     let depth = |shape, at: Vector3<f64>, direction: Vector3<f64>| {
@@ -110,7 +110,7 @@ fn known_bodies_have_known_depths() {
     let at = Vector3::new(0.0, 0.0, 3.0);
     let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
     close(depth(Shape::Ball(0.5), at, ahead), 2.5);
-    // Seen at 0.1 aside: z^2 (1 + 0.01) - 6 z + 9 - 0.25 = 0.
+    // Seen at 0.1 to the side: z^2 (1 + 0.01) - 6 z + 9 - 0.25 = 0.
     let expected = (6.0 - f64::sqrt(36.0 - 4.0 * 1.01 * 8.75)) / 2.02;
     close(depth(Shape::Ball(0.5), at, Vector3::new(0.1, 0.0, 1.0)), expected);
     close(depth(Shape::Cuboid(Vector3::new(0.5, 0.5, 0.2)), at, Vector3::new(0.1, -0.1, 1.0)), 2.8);
@@ -123,7 +123,7 @@ fn known_bodies_have_known_depths() {
         depth(Shape::Drum { radius: 0.4, half_height: 0.25 }, at, Vector3::new(0.12, 0.0, 1.0)),
         2.75,
     );
-    // From the side: its axis is the ray's y.
+    // From the side: its axis is the ray's y axis.
     let lying = Isometry3::new(at, Vector3::x() * std::f64::consts::FRAC_PI_2);
     let drum = alone(Shape::Drum { radius: 0.4, half_height: 0.25 }, lying);
     let hit = cast(&drum, &Vector3::zeros(), &ahead).unwrap();
@@ -149,7 +149,7 @@ fn pictures(room: &Room, camera: &Camera, poses: &[Pose]) -> Vec<Picture> {
     poses.iter().map(|p| taker.take(&p.world_from_camera)).collect()
 }
 
-/// The tiles leave nothing out: every pixel is what a single ray through the whole room meets.
+/// The tiles miss nothing: every pixel is what a single ray through the whole room meets.
 #[test]
 fn pictures_are_what_single_rays_meet() {
     let (room, camera) = (Room::office(Seed(2)), small());
@@ -188,7 +188,7 @@ fn normals_are_of_unit_length_and_face_the_camera() {
             assert!(normal.dot(&point(i)) < 1e-6, "pixel {i} sees a back");
             let (right, below) = (i + 1, i + camera.width);
             if seen.surface[right] == seen.surface[i] && seen.surface[below] == seen.surface[i] {
-                // What three neighbouring points span, whatever they lie on.
+                // The normal spanned by three neighbouring points, whatever the shape.
                 let spanned = (point(below) - point(i)).cross(&(point(right) - point(i)));
                 flat.push(spanned.normalize().dot(&normal).clamp(-1.0, 1.0).acos());
             }
@@ -199,7 +199,7 @@ fn normals_are_of_unit_length_and_face_the_camera() {
     }
 }
 
-/// What frame A saw lies where the two poses say, seen from B: on a surface, or behind one.
+/// Points seen in frame A lie, by the two poses, on a surface seen from B or behind one.
 #[test]
 fn points_of_one_frame_lie_on_the_surfaces_of_another() {
     let (room, camera) = (Room::office(Seed(2)), small());
@@ -215,7 +215,7 @@ fn points_of_one_frame_lie_on_the_surfaces_of_another() {
             let in_world = path[a].world_from_camera * in_a;
             let way = in_world.coords - from_b.translation.vector;
             let hit = cast(&room, &from_b.translation.vector, &way).expect("a wall at least");
-            // One metre of way is one unit of t: the point is at 1 exactly.
+            // `way` ends at the point, so the point is at t = 1.
             assert!(hit.t < 1.0 + 1e-5, "pixel {i} of frame {a} hangs in the air: {}", hit.t);
             visible += usize::from(hit.t > 1.0 - 1e-5);
             all += 1;
@@ -239,7 +239,7 @@ fn the_default_path_touches_nothing() {
     assert_clear(&Room::office(Seed(1)), &around_the_desks(), CLEARANCE_M);
 }
 
-/// Three paths with motion capture: around the desks, along desks, and hardly moving.
+/// Three motion-capture paths: around desks, along desks, and almost still.
 #[test]
 fn real_paths_fit_and_touch_nothing() {
     let room = Room::office(Seed(1));
@@ -251,7 +251,7 @@ fn real_paths_fit_and_touch_nothing() {
         let placed = place(&room, &poses).unwrap();
         let moved = placed.apply(&poses);
         assert_clear(&room, &moved, CLEARANCE_M);
-        // Rigid: distances between poses are the file's.
+        // Rigid: distances between poses are preserved.
         let gap = |p: &[Pose]| {
             let [a, b] = [0, p.len() / 3].map(|k| p[k].world_from_camera.translation.vector);
             (a - b).norm()
@@ -285,7 +285,7 @@ fn resampling_keeps_straight_motion_and_follows_a_curve() {
     let samples: Vec<Pose> = (0..=40).map(|k| curve(0.1 * f64::from(k))).collect();
     for p in resample(&samples, None).unwrap().poses {
         let off = p.world_from_camera.inverse() * curve(p.stamp).world_from_camera;
-        // Inside the path the cubic is good to (0.1 s)^4; at its ends speeds are one-sided.
+        // Inside the path the cubic is accurate to (0.1 s)^4; at its ends velocities are one-sided.
         let limit = if (0.2..3.8).contains(&p.stamp) { 3e-5 } else { 2e-3 };
         assert!(off.translation.vector.norm() < limit, "{}: {}", p.stamp, off.translation);
     }
@@ -326,7 +326,7 @@ fn a_path_larger_than_the_room_is_refused_with_its_size() {
     assert!(message.contains("11.0 x 0.0 m") && message.contains("--frames"), "{message}");
 }
 
-/// The words scatter about the true depth as the model says, over all tilts of a room.
+/// The words scatter about the true depth as the model says, over all tilts in a room.
 #[test]
 fn depth_scatters_by_the_models_sigma() {
     let film = Film {
@@ -343,7 +343,7 @@ fn depth_scatters_by_the_models_sigma() {
     for (i, &word) in depth.raw.iter().enumerate() {
         let z = f64::from(picture.seen.depth[i]);
         let sigma = common::truth().sigma(z, picture.seen.theta(i));
-        // Sigma a fiftieth of the depth: the way through disparity stays straight.
+        // Sigma below a fiftieth of the depth: the conversion through disparity is nearly linear.
         if sigma < 0.02 * z {
             scores.push((Film::CODE.metres(word).unwrap() - z) / sigma);
         }
@@ -470,8 +470,8 @@ fn a_bad_trajectory_is_told_with_file_and_line() {
     }
 }
 
-/// Dots on the furniture, matched: what is measured lies near the true depth where a face is wide, as
-/// disparity has it to within what is usual of the sensor, and a lens that nobody knows moves it.
+/// Projected dots on the furniture, matched: on wide faces the measured disparities agree with the true
+/// depths within the sensor's usual noise, and an unknown lens distortion increases their errors.
 #[test]
 fn a_room_is_filmed_by_light() {
     let film = |lens_k1: f64| {
@@ -489,7 +489,7 @@ fn a_room_is_filmed_by_light() {
         let pixels_m = sensor.camera.fx * sensor.baseline_m.unwrap();
         let errors = |(picture, depth): &(Picture, Frame)| -> Vec<f64> {
             let (width, seen) = (depth.width, &picture.seen);
-            // The whole window is on one face.
+            // The whole matching window is on one face.
             let is_inside = |i: &usize| {
                 let (u, v) = (i % width, i / width);
                 let inside = (6..width - 6).contains(&u) && (6..depth.height - 6).contains(&v);
@@ -512,8 +512,8 @@ fn a_room_is_filmed_by_light() {
         [0.5, 0.9].map(|share| all[(share * all.len() as f64) as usize])
     };
     let [median, most] = film(0.0);
-    // Disparity scatters by .1 px at some metres: of a Gaussian half lies within .67 of that and nine
-    // tenths within 1.64; faces seen at a slant have more.
+    // Disparity noise is .1 px at some metres: half of a Gaussian lies within .67 of that and nine tenths
+    // within 1.64; slanted faces have more.
     assert!(median < 0.1 && most < 0.3, "{median} px, {most} px");
     let bent = film(0.1);
     assert!(bent[0] > 1.3 * median && bent[1] > 1.3 * most, "{bent:?} px against {median}, {most}");
@@ -535,7 +535,7 @@ fn options_of_a_bench_are_refused_in_a_room() {
     assert!(!Path::new("never-written").exists());
 }
 
-/// Sigma in the whole room, not only where the paper measured.
+/// Sigma in the whole room, not only in the range that the paper measured.
 #[test]
 fn the_published_models_film_too() {
     let folder = tempfile::tempdir().unwrap();

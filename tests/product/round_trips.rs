@@ -1,4 +1,4 @@
-//! What is written is read back as it was, whatever the numbers are; every format.
+//! In every format, what is written reads back unchanged, whatever the numbers.
 
 use std::path::Path;
 
@@ -93,7 +93,7 @@ prop_compose! {
     }
 }
 
-/// A recording of one view with one frame.
+/// Writes a recording of one view with one frame.
 fn write(root: &Path, sensor: &Sensor, notes: &ViewNotes) {
     let Camera { width, height, .. } = sensor.camera;
     let frame = Frame { width, height, raw: vec![700; width * height] };
@@ -128,7 +128,7 @@ proptest! {
                 prop_assert_eq!(&read.sensor, &sensor);
                 prop_assert_eq!(&read.views[0].notes, &notes);
             }
-            // 700 everywhere may be no depth of this code, which the words themselves say.
+            // 700 everywhere may be no depth in this code; the error then names raw disparities.
             Err(e) => prop_assert!(e.to_string().contains("raw disparities"), "{}", e),
         }
     }

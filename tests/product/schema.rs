@@ -1,4 +1,4 @@
-//! The schemas against files that the tool writes, by Python's validator.
+//! The schemas against files that the tool writes, checked by Python's validator.
 
 use std::process::Command;
 
@@ -59,7 +59,7 @@ fn the_files_are_as_their_schemas_say() {
         assert_eq!(errors("model", &at("every.json")), none, "{name}");
     }
 
-    // What is no such file is refused.
+    // Files that do not match their schema are refused.
     let text = std::fs::read_to_string(at("fit/model.json")).expect("read");
     let mut broken: Value = serde_json::from_str(&text).expect("JSON");
     broken["sigma"]["parameters"]["a"] = json!("much");
@@ -86,7 +86,7 @@ fn completions_and_the_manual_know_every_command() {
         calibrate.contains("kinoise\\-calibrate")
             && calibrate.contains("kinoise calibrate recording")
     );
-    // Once more over its own, and not over what others wrote.
+    // The pages may be rewritten, but not with a foreign file among them.
     kinoise().arg("man").arg(&pages).assert().success();
     std::fs::write(pages.join("mine.1"), "x").expect("written");
     kinoise().arg("man").arg(&pages).assert().code(2);

@@ -1,4 +1,4 @@
-//! Kinds of cameras: presets of `--sensor`, and what a diagnosis looks for in which.
+//! Kinds of cameras: presets of `--sensor`, and which effects a diagnosis considers for which.
 
 use kinoise::diagnose::{DiagnoseOptions, diagnose};
 use kinoise::effects::{Active, CATALOGUE};
@@ -11,8 +11,8 @@ use serde_json::Value;
 
 use crate::common::kinoise;
 
-/// diagnosis.json of a wall whose disparities come in steps of an eighth of a pixel, and lie off by a
-/// tenth, by a camera that is said to be of this kind.
+/// diagnosis.json of a wall with disparity steps of an eighth of a pixel and pixel locking of 0.05 px, by a
+/// camera declared to be of this kind.
 fn diagnosed(kind: Option<SensorKind>) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     let poses =
@@ -47,7 +47,7 @@ fn a_time_of_flight_camera_has_no_disparity() {
     }
 }
 
-/// A plain folder of a Kinect's images, which says nothing, with `--sensor`.
+/// A plain folder of a Kinect's images, without a description, read with `--sensor`.
 #[test]
 fn a_preset_stands_for_what_a_folder_does_not_say() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -75,7 +75,7 @@ fn a_preset_stands_for_what_a_folder_does_not_say() {
     assert_eq!((sensor["fx"].as_f64(), sensor["baseline_m"].as_f64()), (Some(145.0), Some(0.075)));
     assert_eq!(sensor["kind"], "structured-light");
     assert_eq!(sensor["sensor"], "Kinect for Xbox 360");
-    // Sigma in px: sigma f b/z^2, of the cell.
+    // Sigma in px is sigma f b/z^2 of the cell.
     let table = std::fs::read_to_string(out.join("measurements.csv")).expect("read");
     let mut lines = table.lines().map(|l| l.split(',').collect::<Vec<_>>());
     let header = lines.next().expect("a header");
@@ -90,7 +90,7 @@ fn a_preset_stands_for_what_a_folder_does_not_say() {
     }
     assert!(rows > 0);
 
-    // A recording that describes itself is not overruled.
+    // A recording that describes itself is not overridden.
     let run = kinoise().args(["calibrate", "--sensor", "kinect-v1", "-o", "x"]).arg(&made).output();
     let run = run.expect("started");
     let said = String::from_utf8_lossy(&run.stderr).into_owned();

@@ -1,4 +1,4 @@
-//! `kinoise sigma`: images of what the model predicts, beside the depth images of a film.
+//! `kinoise sigma`: images of the predicted sigma beside the depth images of a film.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ fn film(folder: &Path) {
     film.write(folder, &|_, _| ()).expect("written");
 }
 
-/// Eq. 1, twice the variance in the corners, and a bowl.
+/// Eq. 1 with twice the variance in the corners, and a bowl.
 fn dim() -> NoiseModel {
     let over = |times| Basis::powers(Coordinate::RadiusSquared, 1, times);
     let shape = vec![
@@ -77,7 +77,7 @@ fn every_depth_image_gets_its_sigma() {
             assert!(raw == 0 || off.abs() <= 0.5, "{i}: {raw}, not {sigma} m");
         }
     }
-    // In the middle sigma is Eq. 1's at the tilt that the wall has there, within its range.
+    // Almost nowhere is sigma below that of a frontal wall by Eq. 1.
     let frame = film.depth(&film.moments[0]).expect("a frame");
     let depth = film.sensor.code.table().depths(&frame);
     let sigma = correction.sigma_m(&depth, &Conditions::default()).expect("sigma");

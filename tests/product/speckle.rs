@@ -1,9 +1,8 @@
-//! The Kinect by light against physics.md: nothing here knows how the errors come about.
+//! The speckle simulation of a Kinect against physics.md; these tests know nothing of how the errors arise.
 //!
-//! Errors are disparities in px: fx b / z measured less fx b / z true. A picture of 240 x 180 px
-//! with a Kinect's own pixels keeps the figures of physics.md and a test below some seconds.
-//! Every test has fixed seeds; the false-alarm probabilities say how often another seed would
-//! fail it.
+//! Errors are disparities in px: measured minus true fx b / z. An image of 240 x 180 px with a Kinect's own
+//! pixels keeps the numbers of physics.md and takes only seconds per test.
+//! All seeds are fixed; the false-alarm probabilities say how often another seed would fail a test.
 
 use kinoise::effects::Instant;
 use kinoise::scene::{Bench, Board, Target};
@@ -18,7 +17,7 @@ fn causes(text: &[&str]) -> Causes {
     text.iter().fold(Causes::default(), |c, t| c.parse(t).expect("a cause"))
 }
 
-/// physics.md, 0: 2.87 mm z^2. Deterministic as soon as a hundred depths occur.
+/// physics.md, 0: steps of 2.87 mm z^2. Deterministic as soon as a hundred depths occur.
 #[test]
 fn depths_come_in_steps_of_2_87_mm_z_squared() {
     for (step, expected) in [("step_px=0.125", 2.874e-3), ("step_px=0.25", 5.747e-3)] {
@@ -38,9 +37,10 @@ fn depths_come_in_steps_of_2_87_mm_z_squared() {
     }
 }
 
-/// physics.md, 4: about .75, .4 and 0 at lags 1, 4 and 9 of a 9 x 9 window; .91 at 1 along a
-/// column; rounding to 1/8 px is white and takes a tenth of all. 43,000 px are 530 windows: the standard error of a correlation is below 0.045, the
-/// margins are four of them; false alarm below 1e-3 in all.
+/// physics.md, 4: correlations of about .75, .4 and 0 at lags 1, 4 and 9 of a 9 x 9 window; .91 at 1 along a
+/// column; rounding to 1/8 px is white and takes a tenth of all. 43,000 px are 530 windows: the standard
+/// error of a correlation is below 0.045, the margins are four of them; false alarm probability below 1e-3
+/// in all.
 #[test]
 fn errors_hang_together_over_the_matching_window() {
     let nine = watch(&Causes::default(), &frontal(1.3), 1, 3);
@@ -64,9 +64,9 @@ fn errors_hang_together_over_the_matching_window() {
     assert!(along(&wide, 9) > 0.2, "a wider window reaches farther: {}", along(&wide, 9));
 }
 
-/// physics.md, 5: temporal / static is .2 to .45 where light abounds; the frozen map comes again
-/// in every frame and not in another view. Sd of 530 windows: 3 %; the margins are more than ten
-/// of that.
+/// physics.md, 5: temporal / static noise is .2 to .45 with ample light; the frozen pattern repeats in every
+/// frame but not in another view. The standard deviation over 530 windows is known to 3 %; the margins are
+/// more than ten of that.
 #[test]
 fn most_of_the_noise_stands_still_while_the_scene_does() {
     for z in [0.9, 1.3] {
@@ -90,8 +90,8 @@ fn most_of_the_noise_stands_still_while_the_scene_does() {
 }
 
 /// physics.md, 4.4: flat up to 70 degrees at 1 m (g = 0.2), then x 2.5 and dropout at g = 0.35.
-/// The projector makes up for the cosine, so that only the tilt acts. Sd of a temporal sigma from
-/// 8 frames and 400 windows: 2 %.
+/// The projector's light compensates for the cosine, so that only the tilt acts. A temporal sigma from 8
+/// frames and 400 windows is known to 2 %.
 #[test]
 fn temporal_noise_is_flat_and_then_explodes_with_dropout() {
     let tilted = |degrees: f64| {
@@ -116,8 +116,8 @@ fn temporal_noise_is_flat_and_then_explodes_with_dropout() {
     assert!(dim.missing() > 0.1, "at its own light it loses more: {}", dim.missing());
 }
 
-/// physics.md, 8: sigma_d^2 = sigma_0^2 + (~1.0 px g)^2 with g = b tan(theta) / z. Sd 3 % of a
-/// sigma, 10 % of a difference of squares.
+/// physics.md, 8: sigma_d^2 = sigma_0^2 + (~1.0 px g)^2 with g = b tan(theta) / z. A sigma is known to 3 %,
+/// a difference of squares to 10 %.
 #[test]
 fn static_noise_grows_with_tan_theta_over_z() {
     let flat = |z| watch(&Causes::default(), &frontal(z), 2, 6).frozen_px();
@@ -134,17 +134,17 @@ fn static_noise_grows_with_tan_theta_over_z() {
     assert!(high / low < 1.5, "g alone says it: {factors:?}");
 }
 
-/// physics.md, 38: fx b (1/z1 - 1/z2), 21.8 px before a wall at 2 m and 32.6 px at 4 m, on the left
-/// only (the projector stands on the right). Eight boards put the edges on other dots; their
-/// scatter gives the error of a mean.
+/// physics.md, 38: fx b (1/z1 - 1/z2), 21.8 px in front of a wall at 2 m and 32.6 px at 4 m, on the left
+/// only (the projector is on the right). Eight boards put the edges on different dots; their scatter gives
+/// the error of a mean.
 ///
-/// The infrared picture shows the band itself, less the tails of the dots on both edges: a column
-/// counts as lit at a tenth of the wall's light, which a dot of sd s gives 1.28 s from the wall's
-/// edge, and (the board being 4 or 16 times brighter) 1.96 s or 2.5 s from the board's. Dots of
-/// FWHM 1 to 2 px (s = 0.43 to 0.85 px) take 1.4 to 3.2 px.
+/// The infrared image shows the band itself, less the tails of the dots at both edges: a column counts as lit
+/// at a tenth of the wall's light, which a dot of standard deviation s produces 1.28 s from the wall's edge,
+/// and (the board being 4 or 16 times brighter) 1.96 s or 2.5 s from the board's. Dots of FWHM 1 to 2 px
+/// (s = 0.43 to 0.85 px) take 1.4 to 3.2 px.
 ///
-/// In depth, windows that straddle the edges find something: up to a window less, and the more
-/// the brighter the wall, so that the growth of 10.9 px is met within a pixel only.
+/// In depth, windows across the edges find matches: the band is narrower by up to a window, and more so the
+/// brighter the wall, so that its growth of 10.9 px is accurate to a pixel only.
 #[test]
 fn the_shadow_is_on_one_side_and_as_wide_as_geometry_says() {
     let boards = (0..8).map(|k| 0.040 + 0.007 * f64::from(k));
@@ -170,11 +170,11 @@ fn the_shadow_is_on_one_side_and_as_wide_as_geometry_says() {
     assert!(lit_side < 2.0, "no shadow on the right: {lit_side} px");
 }
 
-/// What a board at 1 m leaves of a wall, px a row.
+/// What a board at 1 m hides of a wall, px per row.
 struct Band {
     /// Columns without light on the left.
     dark: f64,
-    /// Pixels without depth on the right, and how many more on the left.
+    /// Pixels without depth on the right, and how many more there are on the left.
     lit_side: f64,
     missing: f64,
 }
@@ -182,7 +182,7 @@ struct Band {
 fn beside_a_board(half_m: f64, wall_m: f64) -> Band {
     let mut bench = Bench { wall_m: Some(wall_m), ..frontal(1.0) };
     bench.target = Target::Board(Board { width_m: 2.0 * half_m, height_m: 1.0 });
-    // Bright enough that nothing but the shadow is dark.
+    // Bright enough that only the shadow is dark.
     let watched = watch(&causes(&["light=4"]), &bench, 1, 7);
     let silent = watch(&causes(&["light=4", "read_noise_dn=0"]), &bench, 1, 7);
     let edge = half_m * 580.0;
@@ -204,8 +204,9 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (square / (n - 1.0) / n).sqrt())
 }
 
-/// physics.md, 10: the projector meets a wall at 70 degrees and 1 m under 70 -+ 4.3 degrees; the
-/// light differs by 1.52, and the dropout with it. Not so for pitch. 2,000 dots of CV 0.7 make 2 %.
+/// physics.md, 10: the projector meets a wall at 70 degrees and 1 m at 70 -+ 4.3 degrees; the light differs
+/// by a factor of 1.52, and the dropout with it. Not so for pitch. 2,000 dots with a coefficient of
+/// variation of 0.7 give 2 %.
 #[test]
 fn yaw_has_two_sides_and_pitch_has_not() {
     let look = |azimuth: f64| watch(&Causes::default(), &wall(1.0, 72.0, azimuth), 1, 8);
@@ -226,9 +227,9 @@ fn yaw_has_two_sides_and_pitch_has_not() {
     assert!((up.missing() - down.missing()).abs() < 0.5 * (towards.missing() - away.missing()));
 }
 
-/// physics.md, 25: an error odd in u about the projector's axis, (u - u_p) dlam / lam; physics.md,
-/// 24: the baseline's expansion scales every disparity. Pixel locking (physics.md, 3) bends the
-/// slope by 5 % and a mean by up to 0.06 px; noise is small against that (7e-5 in the slope).
+/// physics.md, 25: an error odd in u about the projector's axis, (u - u_p) dlam / lam; physics.md, 24: the
+/// baseline's expansion scales every disparity. Pixel locking (physics.md, 3) changes the slope by 5 % and a
+/// mean by up to 0.06 px; the noise is small compared with that (7e-5 in the slope).
 #[test]
 fn warmth_turns_the_plane_and_scales_the_depth() {
     let hot = ["warm_up_k=15", "warm_up_s=1"];
@@ -253,7 +254,7 @@ fn watch_late(causes: &Causes) -> Watch {
     Watch::take(&sensor, &frontal(2.0), &[instant], Seed(9))
 }
 
-/// physics.md, 19: the reference was seen through the same lens, so the error vanishes at the
+/// physics.md, 19: the reference image was taken through the same lens, so the error vanishes at the
 /// reference (2 m) and grows away from it: (d distortion / dx)(d - d_ref).
 #[test]
 fn an_unknown_lens_shows_away_from_the_reference_only() {
@@ -277,7 +278,7 @@ fn small_shoot(frames: usize, shrink: usize, causes: Causes) -> Shoot {
     }
 }
 
-/// Deterministic: sums of whole numbers, streams by name.
+/// Deterministic: integer sums, and random streams by name.
 #[test]
 fn the_same_seed_gives_the_same_bytes_on_one_thread_and_two() {
     let bytes = |threads: usize| {
@@ -305,7 +306,7 @@ fn the_same_seed_gives_the_same_bytes_on_one_thread_and_two() {
     assert_ne!(one[0].1, one[1].1, "frames differ");
 }
 
-/// physics.md, 0: published disparity noise is .07 to .12 px. One recording, a fit of one number.
+/// physics.md, 0: published disparity noise is .07 to .12 px. One recording, a fit with one parameter.
 #[test]
 fn a_calibration_finds_a_kinects_disparity_noise() {
     let folder = tempfile::tempdir().expect("a temporary folder");

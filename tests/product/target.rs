@@ -1,4 +1,4 @@
-//! Finding the target without a region: scenes drawn here, ray by ray, with a known answer.
+//! Finding the target without a region, in ray-cast scenes with a known answer.
 
 use kinoise::plane::{InverseDepthImage, Plane, Target, find_target};
 use kinoise::simulate::kinect_v1;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// A thing a ray may hit.
+/// An object that a ray may hit.
 enum Thing {
     /// A rectangle: centre, half extents along two unit axes.
     Rectangle {
@@ -42,13 +42,13 @@ impl Thing {
         }
     }
 
-    /// A board at depth z on the axis, turned by theta about the image's vertical axis.
+    /// A board at depth z on the axis, rotated by theta about the image's vertical axis.
     fn board(z: f64, theta: f64, half: [f64; 2]) -> Self {
         let right = Vector3::new(theta.cos(), 0.0, theta.sin());
         Thing::Rectangle { centre: Vector3::new(0.0, 0.0, z), right, down: Vector3::y(), half }
     }
 
-    /// ... so that depth grows towards `azimuth`.
+    /// A board tilted by theta whose depth grows towards `azimuth`.
     fn turned(z: f64, theta: f64, azimuth: f64, half: [f64; 2]) -> Self {
         let (sin, cos) = azimuth.sin_cos();
         let right = Vector3::new(theta.cos() * cos, theta.cos() * sin, theta.sin());
@@ -83,13 +83,13 @@ impl Thing {
 struct Scene {
     camera: Camera,
     w: Vec<f32>,
-    /// Index of the thing each pixel sees.
+    /// Index of the object that each pixel sees.
     seen: Vec<Option<usize>>,
-    /// Step of the code in inverse depth, 1/m; 0 = that of 0.2 mm words.
+    /// Quantisation step in inverse depth, 1/m; 0 = that of 0.2 mm words.
     step: f64,
 }
 
-/// Noise of Eq. 1 along the axis, one pixel in fifty without measurement.
+/// A scene with the noise of Eq. 1 along the axis, and one pixel in fifty invalid.
 fn draw(things: &[Thing], seed: u64) -> Scene {
     draw_with(things, seed, Noise::White)
 }
@@ -97,7 +97,7 @@ fn draw(things: &[Thing], seed: u64) -> Scene {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Noise {
     White,
-    /// Alike over a matching window of 9 x 9 px, and rounded to the raw 11-bit code.
+    /// Correlated by a matching window of 9 x 9 px, and rounded to the raw 11-bit code.
     Kinect,
 }
 
@@ -105,7 +105,7 @@ const MATCHING_WINDOW: usize = 9;
 /// Raw Kinect v1 words: 1/z = offset + slope word (Herrera's unit).
 const RAW: [f64; 2] = [3.3309, -0.0030711];
 
-/// Mean over a window that wraps round, times its side: unit variance again.
+/// Mean over a periodic window times its side length, which restores unit variance.
 fn smooth(noise: &[f64], width: usize) -> Vec<f64> {
     let height = noise.len() / width;
     let window = MATCHING_WINDOW;
@@ -168,7 +168,7 @@ fn find_in(scene: &Scene, region: Option<&Region>) -> Result<Target, String> {
     find_target(&image, region, &mut Seed(1).stream("target"))
 }
 
-/// The target is thing 0: nearly all of what was taken is it, and most of it was taken.
+/// Asserts that the target is thing 0: nearly all taken pixels belong to it, and most of it is taken.
 fn expect_first(name: &str, things: &[Thing], theta: f64) {
     for seed in 0..5 {
         let scene = draw(things, seed);
@@ -218,7 +218,7 @@ fn a_board_on_a_floor_between_boxes() {
     expect_first("floor and boxes", &things, 0.4);
 }
 
-/// Fists at the board's sides and fingers before it.
+/// Fists at the board's sides and fingers in front of it.
 #[test]
 fn hands_that_hold_the_board() {
     let mut things = vec![Thing::board(1.2, 0.3, [0.4, 0.3]), Thing::wall(2.5)];
@@ -236,7 +236,7 @@ fn hands_that_hold_the_board() {
     expect_first("hands", &things, 0.3);
 }
 
-/// A hand right where the principal point looks: the board around it is taken, and it is told.
+/// A hand at the principal point: the board around it is taken, and the hand is reported.
 #[test]
 fn a_hand_over_the_principal_point() {
     let mut things = vec![Thing::board(1.2, 0.3, [0.4, 0.3]), Thing::wall(2.5)];
@@ -262,8 +262,8 @@ fn a_person_behind_and_an_edge_of_a_table() {
     expect_first("person behind", &things, 0.7);
 }
 
-/// A board whose edges leave the picture at a slant, with nothing behind: at the border pixels beside it, which the
-/// sensor could not measure, are not counted as lost.
+/// A board whose edges leave the image at an angle, with nothing behind it: at the border, pixels beside the
+/// board, which the sensor could not measure, are not counted as lost.
 #[test]
 fn what_is_beside_a_board_that_the_picture_cuts_is_not_lost() {
     for (n, turn) in [0.02, 0.05, 0.1, 0.3, 0.7].into_iter().enumerate() {
@@ -283,7 +283,7 @@ fn what_is_beside_a_board_that_the_picture_cuts_is_not_lost() {
         };
         assert!(taken().filter(|&i| at_border(i)).count() > 100, "the picture cuts the board");
         assert_eq!(taken().filter(|&i| scene.seen[i].is_none()).count(), 0, "turned by {turn}");
-        // Holes in the board are lost, at the border as well.
+        // Holes in the board are lost pixels, also at the border.
         assert!(taken().any(|i| at_border(i) && scene.w[i].is_nan()), "turned by {turn}");
     }
 }
@@ -293,7 +293,7 @@ fn a_wall_that_fills_the_picture_is_the_target() {
     expect_first("wall", &[Thing::wall(2.0)], 0.0);
 }
 
-/// Ten rows and eight columns of no reading cut the picture in four.
+/// Ten rows and eight columns without depth cut the image in four.
 #[test]
 fn bands_without_depth_do_not_cut_the_target() {
     for (seed, [z, theta]) in [[1.0, 0.0], [2.0, 0.6], [3.0, 0.2]].into_iter().enumerate() {
@@ -310,8 +310,8 @@ fn bands_without_depth_do_not_cut_the_target() {
     }
 }
 
-/// A driver that stores the range for the depth bends a wall into a bowl. The whole picture is the
-/// target, so that a diagnosis can say what bends it; a room's corner stays none.
+/// A driver that stores the range as depth bends a wall into a bowl. The whole image is the target, so that a
+/// diagnosis can find the cause; a room's corner is not accepted as such.
 #[test]
 fn a_wall_that_the_sensor_bends_is_the_target() {
     for [z, theta] in [[1.0, 0.0], [2.5, 0.4], [1.5, 0.9]] {
@@ -332,8 +332,8 @@ fn a_wall_that_the_sensor_bends_is_the_target() {
     assert!(target.is_err() || !target.unwrap().notes.iter().any(|n| n.contains("bent")));
 }
 
-/// A sensor that reads its even and odd columns, or rows, in two ways, by far beyond its noise: the target is as flat
-/// as it was, so that a diagnosis can say what the sensor does.
+/// A sensor that reads even and odd columns (or rows) differently, by far more than its noise: the target is
+/// still flat, so that a diagnosis can find the cause.
 #[test]
 fn lines_that_alternate_are_no_relief() {
     let offset = 5.0 * SigmaModel::paper().sigma(2.0, 0.0) / 4.0;
@@ -376,9 +376,9 @@ fn no_plane_no_target() {
     assert!(find(&nothing).is_err(), "random depths");
 }
 
-/// Greatest ratio of the scatter about the true board to the truth, over bins of 5 % in depth,
-/// pixels beyond 3.5 sigma cut as the measurement does. Noise that 9 x 9 px share leaves 1000
-/// pixels only 12 independent samples: 1.5 is 2.5 of their standard errors.
+/// Largest ratio of the scatter about the true board to the true sigma, over bins of 5 % in depth, with
+/// pixels beyond 3.5 sigma cut as in the measurement. Noise shared by 9 x 9 px leaves 1000 pixels only 12
+/// independent samples: 1.5 is 2.5 of their standard errors.
 fn worst_bin(scene: &Scene, target: &Target, truth: &Plane) -> f64 {
     const CUT: f64 = 3.5;
     const ENOUGH: f64 = 1000.0;
@@ -397,8 +397,8 @@ fn worst_bin(scene: &Scene, target: &Target, truth: &Plane) -> f64 {
     bins.values().filter(|b| b.0 > ENOUGH).map(|b| (b.1 / b.0).sqrt()).fold(0.0, f64::max)
 }
 
-/// A board tilted before a wall that its far edge nearly touches: never the wall, and no wall in
-/// the bins of the board.
+/// A tilted board whose far edge nearly touches the wall behind it: never the wall, and no wall in the
+/// bins of the board.
 #[test]
 #[ignore = "slow: more than a hundred scenes"]
 fn a_tilted_board_close_before_a_wall_is_never_taken_for_the_wall() {
@@ -441,7 +441,7 @@ fn a_tilted_board_close_before_a_wall_is_never_taken_for_the_wall() {
     assert!(found * 20 >= scenes * 19, "only {found} of {scenes} found");
 }
 
-/// A ball, or a wall, inside the region that was drawn around the board: left out and told.
+/// A ball inside the region drawn around the board is left out and reported.
 #[test]
 fn a_ball_before_the_board_inside_its_region_is_told() {
     let region = Region::Rectangle([200.0, 160.0, 440.0, 320.0]);

@@ -1,4 +1,4 @@
-//! No plausible nonsense: what cannot be meant is refused or told, and alike in every command.
+//! No plausible nonsense: impossible input is refused or reported, in every command alike.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ impl Desk {
         self.folder.path().join(name)
     }
 
-    /// A recording of 160 x 120 px in this code.
+    /// Writes a recording of 160 x 120 px in this code.
     fn recording(&self, name: &str, code: DepthCode, distances_m: &[f64]) -> PathBuf {
         let sensor = Sensor { code, ..kinect_v1(4) };
         let poses = grid(distances_m, &[0.0, 30.0, 60.0]).views();
@@ -43,7 +43,7 @@ impl Desk {
         self.at(name)
     }
 
-    /// Its images alone.
+    /// Writes the images of such a recording alone.
     fn plain(&self, name: &str, code: DepthCode, distances_m: &[f64]) {
         let recording = self.recording(&format!("{name}-recording"), code, distances_m);
         fs::create_dir(self.at(name)).expect("made");
@@ -66,7 +66,7 @@ impl Desk {
         needles.iter().for_each(|n| assert!(said.contains(n), "{line}: \"{n}\" is not in: {said}"));
     }
 
-    /// Exit code 2, the message says all of `needles`, and no model.
+    /// Asserts exit code 2, a message with all of `needles`, and no model.
     #[track_caller]
     fn refused(&self, line: &str, needles: &[&str]) {
         let (code, said) = self.run(line);
@@ -132,7 +132,7 @@ fn a_plain_folder_whose_unit_stays_open_needs_it() {
     let line = format!("calibrate near {INTRINSICS} -o near-out");
     desk.done(&line, &["depth taken as millimetres", "at 5000 a metre the nearest image"]);
     desk.done(&format!("calibrate tum {INTRINSICS} --units-per-metre 5000 -o tum-out"), &[]);
-    // Given and improbable: told.
+    // Given but improbable: reported.
     let line = format!("calibrate near {INTRINSICS} --units-per-metre 5000 -o wrong");
     let (_, said) = desk.run(&line);
     assert!(said.contains("check --units-per-metre"), "{said}");
@@ -141,7 +141,7 @@ fn a_plain_folder_whose_unit_stays_open_needs_it() {
     desk.refused(&line, &["11 bits", "--units-per-metre"]);
 }
 
-/// The second unit's words as lengths: "0.85 mm at 0.84 m", said with exit code 0, was one such.
+/// The second unit's words read as lengths once gave "0.85 mm at 0.84 m" with exit code 0.
 #[test]
 fn the_second_unit_is_read_as_what_it_is() {
     let Some(unit) = data("kinect-v1-second-unit") else { return };
@@ -155,8 +155,8 @@ fn the_second_unit_is_read_as_what_it_is() {
     assert!((3.0..4.0).contains(&farthest), "{farthest} m");
 }
 
-/// Real images in millimetres and in 5000 a metre tell so by a Kinect's steps; with the other unit
-/// that is told.
+/// Real images in millimetres and in 5000 per metre reveal their unit by a Kinect's steps; the other unit is
+/// reported.
 #[test]
 fn the_steps_of_real_kinects_tell_their_unit() {
     let assumed = |units: Option<f64>| Assumed {
@@ -201,7 +201,7 @@ fn a_fit_that_explains_nothing_writes_its_page_and_no_model() {
             &format!("{},{},{}\n", 1.0 + 0.25 * k as f64, 0.1 * (k % 3) as f64, 1e-3 * sigma_mm);
     }
     fs::write(desk.at("t.csv"), table).expect("written");
-    // In the second round a model of the first stands there, which would be taken for this page's.
+    // In the second round the first round's model is there, and would be taken for that of the new page.
     for command in
         ["fit t.csv --form khoshelham -o out", "calibrate t.csv --form khoshelham -o out"]
     {
@@ -274,7 +274,7 @@ fn a_camera_that_cannot_be_meant_is_refused_by_every_command() {
     }
 }
 
-/// The benchmark's cameras are known by the lists' comments, whoever reads them.
+/// Every command takes the benchmark's cameras from the comments in the lists.
 #[test]
 fn a_tum_folder_has_one_camera_for_every_command() {
     let desk = Desk::new();
@@ -362,7 +362,7 @@ fn truth_and_estimate_swapped_are_told() {
     assert!(json["remarks"][0].as_str().expect("a remark").contains(ASK));
 }
 
-/// A model of another camera is told at once, with what differs; so is what stands in for a model.
+/// A model of another camera is reported at once, with the difference; so is the default model.
 #[test]
 fn a_sequence_says_whose_model_weighs_it() {
     let desk = Desk::new();
@@ -376,7 +376,7 @@ fn a_sequence_says_whose_model_weighs_it() {
     fs::write(desk.at("other.json"), other.to_string()).expect("written");
     desk.done("simulate film --room --frames 4 -m cal/model.json", &[]);
     for command in ["map film", "compare film", "diagnose rec"] {
-        // Four frames are too short a film to compare over a second; what is read is told before.
+        // Four frames are too short for a comparison over a second, but the model is reported before.
         let (_, said) = desk.run(&format!("{command} -m other.json -o out"));
         assert!(
             said.contains("other.json seems to be of another sensor: the model's focal"),
@@ -391,7 +391,7 @@ fn a_sequence_says_whose_model_weighs_it() {
     desk.done("map film -o own", &["no --model was given", "Eq. 1, for a Kinect v1 at 1 to 4 m"]);
 }
 
-/// The benchmark publishes its cameras: what replaces one is told.
+/// The benchmark publishes its cameras: replacing one is reported.
 #[test]
 fn intrinsics_in_place_of_a_published_camera_are_told() {
     let desk = Desk::new();
@@ -410,7 +410,7 @@ fn intrinsics_in_place_of_a_published_camera_are_told() {
 
 // ---- folders that are something else ---------------------------------------------------------
 
-/// The folder above a recording, and what the tool itself has written.
+/// The folder above a recording, and folders written by the tool itself.
 #[test]
 fn a_folder_that_is_no_recording_says_what_it_is() {
     let desk = Desk::new();
@@ -434,7 +434,7 @@ fn a_folder_that_is_no_recording_says_what_it_is() {
     desk.refused(intrinsics, &written);
 }
 
-/// A film with a single still stretch is measured, and that is no model.
+/// A single view is measured, but gives no model.
 #[test]
 fn one_view_makes_no_model() {
     let desk = Desk::new();

@@ -1,5 +1,5 @@
-//! No loss: nothing that was there goes, nothing is written into what is read, and an interrupted
-//! command leaves nothing that reads as whole.
+//! No data loss: existing files stay, nothing is written into the input, and an interrupted command leaves
+//! nothing that looks complete.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::process::Output;
 
 use crate::common::{copy_tree, good, kinoise, tree};
 
-/// A folder to work in, with a recording, a film and results of every command.
+/// A working folder with the good recording.
 struct Desk {
     folder: tempfile::TempDir,
 }
@@ -23,7 +23,7 @@ impl Desk {
         self.folder.path().join(name)
     }
 
-    /// Names of this folder stand for paths in it.
+    /// Runs a command in this folder; relative names are paths in it.
     fn run(&self, line: &str) -> Output {
         kinoise().current_dir(self.folder.path()).args(line.split(' ')).output().expect("it runs")
     }
@@ -36,7 +36,7 @@ impl Desk {
         said
     }
 
-    /// One message with all of `needles`, and not a byte changed anywhere.
+    /// Asserts a refusal with all of `needles`, and that not a byte changed anywhere.
     #[track_caller]
     fn refused(&self, line: &str, needles: &[&str]) {
         let before = tree(self.folder.path());
@@ -51,7 +51,7 @@ impl Desk {
     }
 }
 
-/// Hidden folders, which only an unfinished output is.
+/// Hidden files and folders, which only unfinished output has.
 fn unfinished(root: &Path) -> Vec<String> {
     let mut found = Vec::new();
     for entry in fs::read_dir(root).expect("a folder") {
@@ -71,7 +71,7 @@ const FILM: &str = "simulate film --room --frames 8 --shrink 4";
 #[test]
 fn a_command_writes_again_over_its_own_results() {
     let desk = Desk::new();
-    // RPE over 1 s wants more than 30 frames.
+    // RPE over 1 s needs more than 30 frames.
     desk.done("simulate film --room --frames 40 --shrink 4");
     desk.done("calibrate rec -o cal");
     let table = "z_m,theta_rad,sigma_m\n1,0,0.0019\n1.5,0,0.0035\n2,0,0.006\n3,0,0.014\n";
@@ -94,7 +94,7 @@ fn a_command_writes_again_over_its_own_results() {
         assert!(!first.is_empty() && names(&first) == names(&second), "{line}");
         assert_eq!(unfinished(&out), [""; 0], "{line}");
     }
-    // What one run does not write is not left there from another.
+    // Files of another run that this one does not write are removed.
     fs::remove_file(desk.at("fit/model.json")).expect("removed");
     fs::write(desk.at("fit/measurements.csv"), "of another run").expect("written");
     desk.done("fit table.csv -o fit");
@@ -129,7 +129,7 @@ fn what_others_wrote_is_not_overwritten() {
     ] {
         desk.refused(line, &[holds]);
     }
-    // Forced, it lies beside what was there.
+    // With --force, results are written beside what was there.
     let before = fs::read(desk.at("dia/diagnosis.json")).expect("read");
     desk.done("calibrate rec -o dia --force");
     desk.done("calibrate rec -o thesis --force");
@@ -191,7 +191,7 @@ mod interrupted {
 
     use super::*;
 
-    /// A program that runs until `ready`, and then gets a signal: which one ended it, and what it said.
+    /// Runs a program until `ready`, then sends a signal; returns the signal that ended it, and its stderr.
     fn stop(desk: &Desk, line: &str, signal: &str, ready: impl Fn() -> bool) -> (i32, String) {
         let mut child = Command::new(env!("CARGO_BIN_EXE_kinoise"))
             .current_dir(desk.folder.path())
@@ -217,7 +217,7 @@ mod interrupted {
         }
     }
 
-    /// Hours of work, so that the signal meets it whatever the machine.
+    /// Hours of work, so that the signal arrives during it on any machine.
     const LONG: &str = "--frames 20000 --ordered";
 
     #[test]

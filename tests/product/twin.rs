@@ -1,4 +1,4 @@
-//! `simulate --like`: the views of a recording shot again, and the circle closed.
+//! `simulate --like`: the views of a recording simulated again, and calibrated to the same model.
 
 use kinoise::io::{Assumed, open};
 use kinoise::measure::MeasureOptions;
@@ -40,12 +40,12 @@ fn shot_again(
     (folder, twin)
 }
 
-/// The real Herrera recording: all 39 views come back, with their planes, regions, stamps and
-/// pixels, and calibrate to the model they were shot with.
+/// The real Herrera recording: all 39 views come back with their planes, regions, stamps and pixels, and
+/// calibrate to the model they were simulated with.
 ///
-/// The surface is compared at 20 points inside the views' range with the twin's own 95 %
-/// intervals: with the truth inside each 95 % of the time, and the points moving together (three
-/// free parameters), fewer than 12 of 20 have a false alarm below 1 %; here the seed is fixed.
+/// The surface is compared at 20 points inside the views' range with the twin's own 95 % intervals: if each
+/// covers the truth 95 % of the time and the points are correlated (three free parameters), fewer than 12
+/// of 20 have a false alarm probability below 1 %; here the seed is fixed.
 #[test]
 fn a_real_recording_shot_again_calibrates_to_its_model() {
     let Some(data) = common::data("herrera-kinect-v1/recording") else { return };
@@ -64,7 +64,7 @@ fn a_real_recording_shot_again_calibrates_to_its_model() {
     for (a, b) in views.views.iter().zip(&again.views) {
         let off = (a.axis_distance_m - b.axis_distance_m).abs();
         assert!(off < 0.001 + 0.001 * a.axis_distance_m, "{}: {off} m", a.name);
-        // The real planes are those of the bent residuals; they differ by less than the bend.
+        // The real planes were fitted to bent residuals; the difference is less than the bend.
         assert!((a.theta_rad - b.theta_rad).abs() < 0.005, "{}", a.name);
     }
     let mut inside = 0;

@@ -1,5 +1,4 @@
-//! Uncertainty budgets: the numbers worked by hand from the formulas of the GUM, and whether the
-//! intervals hold the truth.
+//! Uncertainty budgets: numbers recomputed from the formulas of the GUM, and coverage of the intervals.
 
 use std::path::Path;
 
@@ -33,7 +32,7 @@ fn near(value: f64, expected: f64, what: &str) {
     );
 }
 
-/// The good recording with everything stated; and its calibration.
+/// Calibrates the good recording with all uncertainties stated; returns the JSON result and stderr.
 fn stated(folder: &Path, more: impl Fn(&mut Value)) -> (Value, String) {
     let recording = folder.join("recording");
     copy_tree(good(), &recording);
@@ -63,7 +62,7 @@ fn stated(folder: &Path, more: impl Fn(&mut Value)) -> (Value, String) {
     (serde_json::from_slice(&run.stdout).expect("JSON"), said)
 }
 
-/// Every row from the pose and the statements, by the GUM's formulas.
+/// Every row of a budget from the pose and the statements, by the GUM's formulas.
 #[test]
 fn budgets_are_the_gums() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -94,7 +93,7 @@ fn budgets_are_the_gums() {
         near(number(budget, "value_m"), z - 1.99, "the error");
         near(parts[1], REFERENCE_U_M, "reference");
         near(parts[2], FLATNESS_M / 12f64.sqrt(), "flatness");
-        // 0.2 mm steps under noise of millimetres.
+        // Steps of 0.2 mm under noise of millimetres.
         assert!(parts[3] < 1e-9, "{parts:?}");
         let [du, dv] = [CENTRE_U_PX[0] / fx * azimuth.cos(), CENTRE_U_PX[1] / fy * azimuth.sin()];
         near(parts[4], z * theta.tan() * (du * du + dv * dv).sqrt(), "principal point");
@@ -138,7 +137,7 @@ fn budgets_are_the_gums() {
     near(first.parse().expect("a number"), number(&views[0]["distance_error"], "expanded_m"), "U");
 }
 
-/// Without the uncertainty of the reference there is no budget of the error; without any, none at all.
+/// Without the reference's uncertainty there is no budget of the error; without any statement, no budget.
 #[test]
 fn what_is_not_stated_is_listed() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -157,14 +156,14 @@ fn what_is_not_stated_is_listed() {
     assert!(json_of(&out.join("model.json")).get("uncertainty").is_none());
 }
 
-/// Eighty walls by a tape of 0.5 mm: the standard error of the plane is what the planes scatter by,
-/// and U with k = 2 holds the error of a sensor without one.
+/// Eighty walls with a tape of 0.5 mm: the planes scatter by their standard errors, and U with k = 2 covers
+/// the error of a sensor without bias.
 #[test]
 fn the_intervals_hold_the_truth() {
     const VIEWS: usize = 80;
     const TAPE_M: f64 = 0.0005;
     let folder = tempfile::tempdir().expect("a folder");
-    // Off the axis by tilts, so that the plane on the axis is not the mean depth.
+    // Tilted off the axis, so that the plane's distance on the axis is not the mean depth.
     let grid = Grid { distances_m: vec![2.0; VIEWS / 2], tilts_rad: vec![0.0, 0.5] };
     let mut sensor = kinect_v1(8);
     sensor.intrinsics_uncertainty =
@@ -196,7 +195,7 @@ fn the_intervals_hold_the_truth() {
         let budget = v.distance_budget.as_ref().expect("a budget");
         budget.value_m.abs() < budget.expanded_m
     });
-    // 95 % of 80; fewer than 70 with a chance of 1 in 400.
+    // 95 % of 80; fewer than 70 have a probability of 1 in 400.
     let held = held.count();
     assert!(held >= 70, "{held} of {VIEWS}");
     assert!(held < VIEWS, "intervals that always hold are too wide");

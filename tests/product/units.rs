@@ -1,5 +1,5 @@
-//! `kinoise units`: fleets drawn from a known common sigma and scatter, units that changed and units
-//! that did not, and files that cannot be compared.
+//! `kinoise units`: fleets drawn with a known common sigma and scatter, units that changed and units that did
+//! not, and files that cannot be compared.
 
 use std::path::{Path, PathBuf};
 
@@ -20,11 +20,11 @@ fn truth(z: f64, theta: f64) -> f64 {
     Form::Paper.spec().sigma(&PAPER_EQ1, z, theta)
 }
 
-/// Relative scatter of whole views, and pixels that count in each.
+/// Relative scatter between views, and effective number of pixels in each.
 const BETWEEN_VIEWS: f64 = 0.03;
 const N_EFFECTIVE: f64 = 500.0;
 
-/// sigma as a calibration fits it to 24 views of a unit whose noise is this many times Eq. 1.
+/// Sigma calibrated on 24 views of a unit whose noise is `times` Eq. 1.
 fn calibrated(times: f64, seed: u64) -> SigmaModel {
     let mut rng = Seed(seed).stream("units");
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -65,7 +65,7 @@ fn normal(seed: u64, name: &str) -> impl FnMut() -> f64 {
     move || StandardNormal.sample(&mut rng)
 }
 
-/// Six units that scatter by so much.
+/// Compares six units with this relative scatter.
 fn fleet(scatter: f64, seed: u64) -> Comparison {
     let mut own = normal(seed, "own");
     let units: Vec<UnitModel> = (0..6)
@@ -77,8 +77,8 @@ fn fleet(scatter: f64, seed: u64) -> Comparison {
     compare(&units).expect("compared")
 }
 
-/// Over 300 fleets the intervals of common value and scatter hold the truth in 95 % at every place;
-/// false alarm 1 in 1,000 at each of the binomial bounds.
+/// Over 300 fleets the intervals of common value and scatter cover the truth in 95 % at every place; false
+/// alarm 1 in 1,000 at each of the binomial bounds.
 #[test]
 fn common_sigma_and_scatter_are_covered() {
     const FLEETS: u64 = 300;
@@ -102,7 +102,7 @@ fn common_sigma_and_scatter_are_covered() {
     }
 }
 
-/// Units that are all the same: one fleet in a hundred says otherwise, as its tests promise.
+/// Identical units: at most one fleet in a hundred is a false alarm, as the tests claim.
 #[test]
 fn units_of_one_kind_share_a_sigma() {
     const FLEETS: u64 = 300;
@@ -114,8 +114,8 @@ fn units_of_one_kind_share_a_sigma() {
     assert!(at_least(k, FLEETS as usize, 0.01) > 1e-3, "{k} false alarms in {FLEETS} fleets");
 }
 
-/// One of five is a quarter noisier: it is set aside in every fleet, by how much is in its interval, and
-/// another with it no more often than the tests promise.
+/// One of five units is a quarter noisier: it is set apart in every fleet, its interval covers its departure,
+/// and further units are set apart no more often than the tests claim.
 #[test]
 fn the_odd_unit_is_told_apart_from_the_others() {
     const FLEETS: usize = 60;
@@ -143,7 +143,7 @@ fn then_and_now(times: f64, seed: u64) -> Comparison {
     compare(&[unit("a", "2026-06-01", now), unit("a", "2026-01-01", then)]).expect("compared")
 }
 
-/// The same unit twice raises a false alarm in 1 of 100 pairs.
+/// Comparing an unchanged unit with itself gives a false alarm in 1 of 100 pairs.
 #[test]
 fn an_unchanged_unit_has_not_changed() {
     const PAIRS: u64 = 600;
@@ -162,11 +162,11 @@ fn an_unchanged_unit_has_not_changed() {
     }
     let n = PAIRS as usize;
     assert!(at_least(alarms, n, 0.01) > 1e-3, "{alarms} false alarms in {n}");
-    // Six places of a pair go together: one pair in so many counts.
+    // The six places of a pair are correlated: count one per pair.
     assert!(at_most(covered / 6, n, 0.95) > 1e-3, "{covered} of {}", 6 * n);
 }
 
-/// A fifth more noise is found in every pair, with its size, whatever the order of the files.
+/// 20 % more noise is found in every pair, with its size, whatever the order of the files.
 #[test]
 fn a_changed_unit_is_found() {
     for seed in 0..50 {
@@ -180,7 +180,7 @@ fn a_changed_unit_is_found() {
     }
 }
 
-/// A bowl and a map of the picture, as a diagnosis of this certainty finds them about the truth.
+/// A bowl and a map over the image, scattered about the truth by this standard error.
 fn bias(bowl: f64, std_error: f64, seed: u64) -> Effect {
     let mut normal = normal(seed, "bias");
     let bases = [
@@ -188,7 +188,7 @@ fn bias(bowl: f64, std_error: f64, seed: u64) -> Effect {
         Basis::Map { width: 640.0, height: 480.0, across: 5, down: 4, times: Modulation::One },
     ];
     let count: usize = bases.iter().map(Basis::count).sum();
-    // Two parts that all coefficients share, and one of each coefficient's own.
+    // Two factors shared by all coefficients, and an independent error of each coefficient.
     let shared: Vec<Vec<f64>> =
         (0..2).map(|_| (0..count).map(|_| 0.5 * std_error * normal()).collect()).collect();
     let by = [normal(), normal()];
@@ -221,7 +221,7 @@ fn with_bias(serial: &str, date: &str, effect: Effect, seed: u64) -> UnitModel {
     unit
 }
 
-/// The bias at two dates: false alarms at their level, a change found with its size in metres.
+/// The bias at two dates: false alarms at the nominal rate, and a change found with its size in metres.
 #[test]
 fn a_bias_that_changed_is_found_and_one_that_did_not_is_not() {
     const STD_ERROR: f64 = 0.02;
@@ -239,24 +239,24 @@ fn a_bias_that_changed_is_found_and_one_that_did_not_is_not() {
     for seed in 0..CHANGED {
         let found = pair(0.5, seed);
         assert!(found.changed, "seed {seed}: p {}", found.p_adjusted);
-        // A pixel of disparity is z^2 / (fx baseline) of depth.
+        // One pixel of disparity is z^2 / (fx baseline) of depth.
         let far = found.distances.last().expect("distances");
         let expected = 0.4 * RADIUS_SQUARED_RMS * far.z_m.powi(2) / (580.0 * 0.075);
-        // At worst all of the error lies along the bowl: four standard deviations of it.
+        // At worst the whole error lies along the bowl: four standard deviations of it.
         let off = (far.change_rms_m - expected).abs();
         assert!(off < 4.0 * far.error_rms_m, "seed {seed}: {far:?} {expected}");
         ratios += far.change_rms_m / expected;
     }
-    // The error is a quarter of the change: of the mean 5 %, and two of these.
+    // The error is a quarter of the change: 5 % of the mean, and two of these.
     let mean = ratios / CHANGED as f64;
     assert!((mean - 1.0).abs() < 0.1, "{mean}");
 }
 
-/// Of r^2 over a 4:3 picture with r = 1 in the corner: u^2 and v^2, uniform up to 0.8 and 0.6, have
-/// variances of 4/45 of the fourth powers; the root of 4/45 (0.8^4 + 0.6^4).
+/// Standard deviation of r^2 over a 4:3 image with r = 1 in the corner: u^2 and v^2, with u and v uniform
+/// up to 0.8 and 0.6, have variances of 4/45 of the fourth powers; the root of 4/45 (0.8^4 + 0.6^4).
 const RADIUS_SQUARED_RMS: f64 = 0.2188;
 
-/// What the fleet shares of its bias, and one unit's own.
+/// The bias that the fleet shares, and that of a single unit.
 #[test]
 fn a_bias_of_ones_own_is_told_from_the_common_one() {
     let bowls = [0.1, 0.1, 0.5, 0.1];
@@ -270,7 +270,7 @@ fn a_bias_of_ones_own_is_told_from_the_common_one() {
     assert!(far.units[2].departure_rms_m > 3.0 * far.units[0].departure_rms_m, "{far:?}");
 }
 
-/// A file with one change, on disk.
+/// Writes a model with one change.
 fn write(folder: &Path, name: &str, unit: &UnitModel, change: impl Fn(&mut Value)) -> PathBuf {
     let mut value: Value =
         serde_json::from_str(&unit.model.to_json().expect("a model")).expect("JSON");
@@ -287,7 +287,7 @@ fn units(models: &[&Path]) -> (Option<i32>, String, String) {
     (run.status.code(), text(&run.stdout), text(&run.stderr))
 }
 
-/// A change to a good file.
+/// A change to a valid file.
 type Fault<'a> = &'a dyn Fn(&mut Value);
 
 #[test]
@@ -340,7 +340,7 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     }
 }
 
-/// A model from before covariances: sigma is compared, its bias is not, and it says so.
+/// A model from before covariances: its sigma is compared, its bias is not, and this is reported.
 #[test]
 fn an_older_file_is_compared_as_far_as_it_goes() {
     let folder = tempfile::tempdir().expect("a folder");

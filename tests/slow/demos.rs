@@ -1,12 +1,11 @@
-//! The demo as a trial: a cause that nobody has chosen, at about its typical strength, must be named first
-//! and alone.
+//! The demo as a trial: a random cause of about its typical strength must be named first and alone.
 
 use std::process::Command;
 
 use serde_json::Value;
 
-/// Twenty seeds. Of fifty others 48 were named first and alone: at that rate fewer than 17 of twenty have
-/// a chance of 0.7 %.
+/// Twenty seeds. Of fifty others 48 were named first and alone: at that rate fewer than 17 of twenty have a
+/// probability of 0.7 %.
 #[test]
 fn causes_of_typical_strength_are_named_first_and_alone() {
     let folder = tempfile::tempdir().expect("a folder");

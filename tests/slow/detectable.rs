@@ -1,4 +1,4 @@
-//! What a diagnosis says of how small an effect it could have shown, against simulation.
+//! The stated smallest detectable sizes of effects, checked by simulation.
 
 use kinoise::diagnose::{DiagnoseOptions, Diagnosis, Verdict, diagnose};
 use kinoise::effects::Active;
@@ -20,8 +20,8 @@ fn seen(effect: Option<&str>, seed: u64) -> Diagnosis {
     diagnose(&recording, &NoiseModel::paper(), &options, &|_, _| ()).expect("diagnosed").diagnosis
 }
 
-/// 40 recordings each of an effect at the minimum that a clean one states for a power of 80 %. At that
-/// rate fewer than 24 are seen once in 250 tests, and more than 38 once in 700. Bands are seen more
+/// 40 recordings each of an effect at the minimum that a clean one states for a power of 80 %. At that rate
+/// fewer than 24 detections occur once in 250 tests, and more than 38 once in 700. Bands are detected more
 /// often than stated, 40 times in 40: for them the minimum is an upper bound.
 #[test]
 fn an_effect_at_its_stated_minimum_is_seen_four_times_in_five() {

@@ -1,11 +1,11 @@
-//! The diagnosis on concealed sets of the proof's ray generator, which shares no formula with it:
-//! nothing is found where nothing is, each effect by its name, and no name for what has none.
+//! The diagnosis on concealed sets of the proof's ray generator, which shares no formula with it: no findings
+//! on clean sets, each effect by its name, and no name for unknown causes.
 
 use crate::rays::{Said, on_disk, order, text};
 use crate::raytraced::{CATALOGUE, Cell, OUTSIDE};
 
-/// 16 clean sets, half of them with correlated noise that the model knows. At a rate of 5 % more
-/// than four alarms have a chance of 8.6e-4.
+/// 16 clean sets, half of them with correlated noise that the model knows. At a rate of 5 % more than four
+/// false alarms have a probability of 8.6e-4.
 #[test]
 fn clean_sets_match() {
     let (mut correlated, mut alarms, mut no_numbers) = (0, Vec::new(), Vec::new());
@@ -65,8 +65,8 @@ fn first_alternative(said: &Said) -> (f64, String) {
     })
 }
 
-/// Eight causes that the catalogue lacks. They are seen on their own axis or one on which they
-/// show as well, and are not dressed up.
+/// Eight causes that the catalogue lacks: found on their own axis or one on which they also show, and not
+/// given a wrong name with confidence.
 #[test]
 fn what_has_no_name_is_given_none() {
     let (mut dressed, mut elsewhere, mut no_numbers) = (Vec::new(), Vec::new(), Vec::new());

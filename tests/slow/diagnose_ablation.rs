@@ -1,5 +1,5 @@
-//! What each part of the diagnosis is for: without it, the same sets are answered visibly worse.
-//! And more pixels of the same picture are no more evidence.
+//! Ablation of the diagnosis: without each part, the same sets are answered clearly worse. And more pixels of
+//! the same image are no more evidence.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn asked(cell: Cell, name: &str, nats: Option<f64>, seed: u64) -> Asked {
     Asked { world: World::Rays, cell, names, nats, seed, small: true }
 }
 
-/// What is said of a folder with a recording and a model.
+/// Diagnosis of a folder with a recording and a model.
 fn said(folder: &Path, ablation: Ablation) -> Value {
     let recording = open(&folder.join("recording"), &Assumed::default()).expect("a recording");
     let model = NoiseModel::read(&folder.join("model.json")).expect("a model");
@@ -29,7 +29,7 @@ fn said(folder: &Path, ablation: Ablation) -> Value {
     serde_json::to_value(&done.diagnosis).expect("JSON")
 }
 
-/// The folder of a set.
+/// Writes a set into a folder.
 fn taken(asked: &Asked) -> TempDir {
     let folder = tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
     conceal(asked).expect("a set").write(folder.path()).expect("written");
@@ -43,7 +43,7 @@ fn alarms(sets: &[TempDir], ablation: Ablation) -> usize {
     count
 }
 
-/// Clean sets whose noise hangs together over seven pixels or more, as the model knows.
+/// Clean sets whose noise is correlated over seven pixels or more, as their model knows.
 fn correlated() -> Vec<TempDir> {
     let wide = |asked: &Asked| {
         let base = conceal(asked).expect("a set").truth().base;
@@ -53,7 +53,7 @@ fn correlated() -> Vec<TempDir> {
     sets.take(6).map(|a| taken(&a)).collect()
 }
 
-/// At 5 % a set the engine proper is wrong on two or more of six in 3 % of trials.
+/// At 5 % per set the full engine is wrong on two or more of six in 3 % of trials.
 #[test]
 fn without_correlation_or_calibrated_thresholds_clean_sets_cry_wolf() {
     let sets = correlated();
@@ -65,7 +65,7 @@ fn without_correlation_or_calibrated_thresholds_clean_sets_cry_wolf() {
     }
 }
 
-/// That they hang together is so, and may be said.
+/// Copied pixels are in fact correlated, so correlation may be found.
 #[test]
 fn doubled_pixels_do_not_raise_confidence() {
     let name = "radial-disparity-bias";
@@ -83,7 +83,7 @@ fn doubled_pixels_do_not_raise_confidence() {
     }
 }
 
-/// What is found beside correlation: names, and how sure they are.
+/// Findings other than correlation: names and probabilities.
 fn others(diagnosis: &Value) -> Vec<(String, f64)> {
     let all = diagnosis["findings"].as_array().expect("findings").iter();
     all.filter(|f| f["status"] != "not-identifiable" && f["statistic"] != "correlation")
@@ -94,9 +94,9 @@ fn others(diagnosis: &Value) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Every pixel four times, by a camera of twice the resolution: the same measurements, each moved
-/// along the target to where its copy looks (a copy left where it was lies off the slope, as a
-/// sensor with lateral noise measures).
+/// Replaces every pixel by four, of a camera with twice the resolution: the same measurements, each shifted
+/// along the target to where its copy looks (without the shift a copy lies off the slope, like the
+/// measurement of a sensor with lateral noise).
 fn double(folder: &Path) {
     let recording = folder.join("recording");
     let opened = open(&recording, &Assumed::default()).expect("a recording");
@@ -130,7 +130,7 @@ fn double(folder: &Path) {
             camera[key] = json!(2.0 * camera[key].as_f64().expect("px"));
         }
         for key in ["cx", "cy"] {
-            // Between the two copies of a pixel is its middle.
+            // The centre of a pixel is between its two copies.
             camera[key] = json!(2.0 * camera[key].as_f64().expect("px") + 0.5);
         }
         for key in ["width", "height"] {

@@ -1,5 +1,5 @@
-//! What the diagnosis says must follow the data: no structure, no finding; the same physics in
-//! another guise, the same name; the model it wrote, nothing left.
+//! Findings must follow the data: no structure, no finding; the same physics transformed, the same name; the
+//! recording's own extended model, nothing left.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::raytraced::{Cell, Set};
 
 const VIEWS: usize = 12;
 
-/// One effect in a set with so many words to a metre, where that matters.
+/// A set with one effect and, if given, this number of words per metre.
 fn single(effect: &str, words: Option<f64>) -> OnDisk {
     let drawn = |seed| order(Cell::Single, effect, seed, VIEWS, 4);
     let has = |&seed: &u64| {
@@ -24,8 +24,8 @@ fn single(effect: &str, words: Option<f64>) -> OnDisk {
     on_disk(drawn((1..60).find(has).expect("one of sixty seeds")))
 }
 
-/// Errors change places within each view's target: what followed the place in the picture, or the
-/// neighbour, follows nothing any more.
+/// Shuffling the errors within each view's target destroys any relation to the place in the image or to the
+/// neighbours.
 #[test]
 fn shuffled_pixels_have_no_bias_and_no_correlation() {
     for effect in ["radial-disparity-bias", "spatial-correlation"] {
@@ -43,7 +43,7 @@ fn shuffled_pixels_have_no_bias_and_no_correlation() {
 
 const WORDS: f64 = 5000.0;
 
-/// Errors of the disparity about each view's true plane are dealt out anew in each frame.
+/// Shuffles the disparity errors about each view's true plane, in each frame.
 fn shuffle(disk: &OnDisk) {
     let set = &disk.set;
     let camera = &set.unit.sensor.camera;
@@ -63,7 +63,7 @@ fn shuffle(disk: &OnDisk) {
                 errors.push(error);
             }
         }
-        // A frame's own mean, which correlated noise moves, would stay through any shuffle.
+        // A frame's own mean, which correlated noise moves, would survive any shuffle.
         let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
         errors.iter_mut().for_each(|e| *e -= mean);
         let sum = frame.raw.iter().map(|&w| u64::from(w)).sum::<u64>();
@@ -74,7 +74,7 @@ fn shuffle(disk: &OnDisk) {
     });
 }
 
-/// Left and right of a picture changed, with the camera's own numbers: the same physics.
+/// A mirrored image with a mirrored camera: the same physics.
 #[test]
 fn a_mirrored_picture_has_the_same_name() {
     let mut others = Vec::new();
@@ -127,7 +127,7 @@ fn names(said: &Said) -> Vec<String> {
         .collect()
 }
 
-/// Twice the words to a metre, every word doubled: the metres are the same to the last bit.
+/// Twice the words per metre, with every word doubled: the metres are the same to the last bit.
 #[test]
 fn another_unit_of_depth_has_the_same_findings() {
     let mut others = Vec::new();
@@ -135,7 +135,7 @@ fn another_unit_of_depth_has_the_same_findings() {
         let disk = single(effect, Some(WORDS));
         let before = disk.diagnosis();
         repaint(&disk.recording, |_, frame| {
-            // Farther than 6.55 m has no word any more; no target is there.
+            // Beyond 6.55 m there is no word any more; no target is there.
             let double = |w: u16| w.checked_mul(2).unwrap_or(0);
             frame.raw.iter_mut().for_each(|w| *w = double(*w));
         });
@@ -151,8 +151,7 @@ fn another_unit_of_depth_has_the_same_findings() {
     assert!(others.is_empty(), "{others:#?}");
 }
 
-/// The same views once more under other names are no news: no mismatch comes of them, and what
-/// was found is still what is found.
+/// Copies of the views under other names add no information: they cause no mismatch, and a finding stays.
 #[test]
 fn views_given_twice_make_no_mismatch() {
     let (mut matches, mut turned) = (0, Vec::new());
@@ -182,7 +181,7 @@ fn twice(disk: &OnDisk) {
     }
 }
 
-/// The loop closes: a recording held against the model that was made of it has nothing left.
+/// A recording diagnosed with the model extended on it has nothing left.
 #[test]
 fn the_extended_model_matches_its_own_recording() {
     let mut open = Vec::new();

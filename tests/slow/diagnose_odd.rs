@@ -1,5 +1,5 @@
-//! Small and odd recordings through the real program: what it can say and no more, one message
-//! where it can say nothing, the same bytes for the same seed.
+//! Small and odd recordings through the real program: it claims no more than it can, gives one message where
+//! it can claim nothing, and the same bytes for the same seed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ struct Run {
 }
 
 impl Run {
-    /// It was found or not: exit code and verdict agree, and the files are there.
+    /// Asserts a diagnosis: exit code and verdict agree, and the files are there.
     #[track_caller]
     fn said(&self) -> Value {
         let text = fs::read_to_string(self.out.join("diagnosis.json")).unwrap_or_default();
@@ -40,7 +40,7 @@ impl Run {
         json
     }
 
-    /// Nothing was said but one message that has all of `needles`, and a remedy.
+    /// Asserts a failure with a single message that contains all of `needles`, and no results.
     #[track_caller]
     fn fails(&self, needles: &[&str]) {
         assert_eq!(self.code, Some(2), "{}", self.stderr);
@@ -115,7 +115,7 @@ fn one_frame_a_view_claims_nothing_and_still_sees_a_bowl() {
     assert_eq!(said["findings"][0]["effect"], "radial-disparity-bias", "{:#}", said["findings"]);
 }
 
-/// Walls at given poses, 320 x 240 px, noise as Eq. 1 has it and nothing else.
+/// Diagnosis of walls at given poses, 320 x 240 px, with the noise of Eq. 1 and nothing else.
 fn posed(distances_m: &[f64], tilts_deg: &[f64]) -> Value {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder");
     let recording = folder.path().join("recording");
@@ -139,7 +139,7 @@ fn posed(distances_m: &[f64], tilts_deg: &[f64]) -> Value {
     diagnose(&recording, folder.path().join("out"), &["--model", model]).said()
 }
 
-/// Raw words of a Kinect are steps of the disparity, which the model does not know of.
+/// Asserts that nothing is found but quantisation steps, which the model does not know.
 #[track_caller]
 fn only_steps(said: &Value) {
     for f in said["findings"].as_array().expect("findings") {
@@ -158,7 +158,7 @@ fn views_square_to_the_axis_claim_nothing_about_tilt() {
     only_steps(&posed(&[0.8, 1.2, 1.6, 2.0, 2.5, 3.0], &[0.0]));
 }
 
-/// 60 x 60 px of every view.
+/// A target of 60 x 60 px in every view.
 #[test]
 fn a_tiny_target_claims_nothing() {
     let disk = clean(51, 8, 3);
@@ -169,7 +169,7 @@ fn a_tiny_target_claims_nothing() {
     claims_nothing(&run(&disk).said());
 }
 
-/// Two of eight views see nothing: they are told of by name and the rest is used.
+/// Two of eight views have no depth: they are reported by name and the rest is used.
 #[test]
 fn views_without_depth_are_left_out_and_said_so() {
     let disk = clean(52, 8, 3);
@@ -204,8 +204,7 @@ fn a_model_without_numbers_is_refused() {
     }
 }
 
-/// Sigma of nought cannot be what anything is held against: refused, or everything is amiss; no
-/// panic and no number that is none.
+/// A sigma of zero cannot be compared with: it is refused, or everything is a mismatch; no panic and no NaN.
 #[test]
 fn a_model_without_noise_is_refused_or_everything_is_amiss() {
     let disk = clean(53, 6, 2);
@@ -224,7 +223,7 @@ fn a_model_without_noise_is_refused_or_everything_is_amiss() {
     }
 }
 
-/// A model says which camera it is of: one of 640 x 480 px is no model of 320 x 240.
+/// A model states its camera: one of 640 x 480 px does not apply to 320 x 240.
 #[test]
 fn a_model_of_another_resolution_is_refused_or_told_of() {
     let disk = clean(54, 6, 2);
@@ -249,7 +248,7 @@ fn a_model_of_another_resolution_is_refused_or_told_of() {
     }
 }
 
-/// Without a baseline a Kinect's is assumed, or the recording is refused; no panic.
+/// Without a baseline that of a Kinect is assumed, or the recording is refused; no panic.
 #[test]
 fn without_a_baseline_it_is_said_what_is_assumed() {
     let disk = clean(55, 6, 2);
@@ -298,7 +297,7 @@ fn exit_codes_are_nought_one_and_two() {
     diagnose(&nowhere, out.path().join("out"), &[]).fails(&["/nowhere/at/all"]);
 }
 
-/// The model that was extended is a model: it can be simulated from, and it corrects.
+/// The extended model can be simulated from and corrected with.
 #[test]
 fn the_extended_model_simulates_and_corrects() {
     for effect in ["radial-disparity-bias", "column-banding", "vignetting", "seam"] {

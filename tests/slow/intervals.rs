@@ -1,5 +1,5 @@
-//! Do the intervals that are told of parameters hold where nature follows another formula of the same
-//! physics? Ray-traced sets of known strength, effect by effect.
+//! Coverage of the parameters' intervals where nature follows another formula of the same physics: ray-traced
+//! sets of known strength, effect by effect.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use crate::rays::said;
 use crate::raytraced::question::{Asked, World};
 use crate::raytraced::{Cell, Set, write};
 
-/// Sets of each effect at each strength.
+/// Seeds of the sets of each effect at each strength.
 const SEEDS: std::ops::Range<u64> = 9100..9104;
 const NATS: [f64; 3] = [150.0, 500.0, 5000.0];
 const EFFECTS: [(&str, Cell); 7] = [
@@ -19,7 +19,7 @@ const EFFECTS: [(&str, Cell); 7] = [
     ("spatial-correlation", Cell::Single),
     ("thermal-drift", Cell::Referenced),
 ];
-/// Standard errors that hold 90 % of a Gaussian.
+/// Standard errors on either side that contain 90 % of a Gaussian.
 const NINETY_PERCENT: f64 = 1.645;
 
 fn set(effect: &str, cell: Cell, nats: f64, seed: u64) -> Set {
@@ -28,7 +28,7 @@ fn set(effect: &str, cell: Cell, nats: f64, seed: u64) -> Set {
     Set::asked(&asked, None, None).expect("a set")
 }
 
-/// Whether each parameter's interval holds what was hidden, of those that are told with an error.
+/// Whether the interval of each parameter reported with an error covers the true value.
 fn held(set: &Set) -> Vec<(String, bool)> {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder");
     write(set, folder.path()).expect("written");
@@ -48,9 +48,8 @@ fn held(set: &Set) -> Vec<(String, bool)> {
     told.collect()
 }
 
-/// Of intervals of 90 % at least 84 % must hold over all, and two thirds of any one parameter's:
-/// were all exact, 200 would fall below with a chance of 0.3 %, and ten of one parameter with 1 %
-/// each.
+/// Of the 90 % intervals at least 84 % must cover over all, and two thirds of any one parameter's: if all
+/// were exact, 200 would fall below with a probability of 0.3 %, and ten of one parameter with 1 % each.
 #[test]
 fn intervals_hold_whatever_the_formula() {
     let mut by_parameter: BTreeMap<String, [usize; 2]> = BTreeMap::new();

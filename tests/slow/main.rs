@@ -1,9 +1,9 @@
-//! Tests of minutes, started by `./run test --slow`: the diagnosis on ray-traced sets, which share no
-//! formula with it, and on odd ones; what each of its parts is for; coverage over hundreds of recordings;
-//! a new effect in a build of its own.
+//! Tests that take minutes, run by `./run test --slow`: the diagnosis on ray-traced sets, which share no
+//! formula with it, and on odd ones; ablation of its parts; coverage over hundreds of recordings; a new
+//! effect in its own build.
 //!
-//! A single test that takes long stays with its siblings as `#[ignore = "slow: ..."]`; `./run test --slow`
-//! runs those too.
+//! A single long test stays with its siblings as `#[ignore = "slow: ..."]`; `./run test --slow` runs those
+//! too.
 
 #![forbid(unsafe_code)]
 

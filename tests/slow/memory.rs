@@ -1,4 +1,4 @@
-//! Memory does not grow with the number of frames, nor a diagnosis's with large images.
+//! Memory does not grow with the number of frames, nor that of a diagnosis with large images.
 
 use std::ffi::OsStr;
 use std::fmt::Write as _;
@@ -17,9 +17,9 @@ use crate::common::{BOARD, truth, write_depth};
 
 const VIEWS: usize = 4;
 const FRAMES: usize = 500;
-/// Images a view; its list names them over and over, so that the disk stays small.
+/// Images per view; the list repeats them, so that little disk space is needed.
 const IMAGES: usize = 8;
-/// All 2,000 frames as words would be 1.2 GB; the accumulators of a view are 20 MB a thread.
+/// All 2,000 frames as words would be 1.2 GB; the accumulators of a view are 20 MB per thread.
 const MAX_MB: f64 = 300.0;
 
 #[test]
@@ -53,11 +53,11 @@ fn two_thousand_frames_fit_into_300_megabytes() {
     assert!(peak_mb < MAX_MB, "{peak_mb} MB");
 }
 
-/// Peak of a diagnosis of eight views of 3 megapixels, MB. Kept whole they take 71 bytes a pixel, 1.8 GB; a
-/// quarter of them does, beside what two threads read a view with.
+/// Limit for the peak of a diagnosis of eight views of 3 megapixels, MB. Kept whole they take 71 bytes per
+/// pixel, 1.8 GB; only a quarter is kept, beside what two threads need to read a view.
 const MAX_LARGE_MB: f64 = 1300.0;
 
-/// Memory goes with what is looked at, and what is looked at is enough.
+/// Memory depends on the examined pixels only, and these suffice.
 #[test]
 fn a_diagnosis_of_large_images_keeps_a_part_of_them_and_finds_the_cause() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -92,7 +92,7 @@ fn a_diagnosis_of_large_images_keeps_a_part_of_them_and_finds_the_cause() {
     assert!(text.contains("one block of 64 x 64 px in 4 is looked at"));
 }
 
-/// The program with these words, to its end, and its peak of memory, MB.
+/// Runs the program with these arguments; returns its exit status and peak memory, MB.
 fn run(words: &[&OsStr]) -> (ExitStatus, f64) {
     let start = Instant::now();
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinoise"))

@@ -1,5 +1,5 @@
-//! An effect is one file and one word: a copy of the source gets both, is built, and simulates,
-//! finds, tells and takes out an effect that nothing else in it has heard of.
+//! An effect is one file and one word in a list: a copy of the source gets both, is built, and simulates,
+//! finds, reports and corrects an effect that nothing else in it knows.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -11,16 +11,16 @@ use kinoise::model::Effect;
 use serde_json::{Value, json};
 
 const FILE: &str = include_str!("../data/row_ripple.rs");
-/// Before this entry of the list the new word is put.
+/// The entry of the list before which the new word is inserted.
 const NEXT_WORD: &str = "    radial_disparity_bias::RadialDisparityBias,\n";
 const WORD: &str = "    row_ripple::RowRipple,\n";
 
-/// A twelfth of a full-size pixel: the picture is four times smaller.
+/// A twelfth of a full-size pixel: the image is four times smaller.
 const AMPLITUDE_PX: f64 = 0.02;
 const PERIOD_PX: f64 = 30.0;
 
-/// The program with the effect in it. What it depends on is built once and kept beside what
-/// `cargo test` builds.
+/// Builds the program with the effect in it. Its dependencies are built once and kept beside the output of
+/// `cargo test`.
 fn build() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let target = Path::new(env!("CARGO_BIN_EXE_kinoise")).ancestors().nth(2).expect("a target");
@@ -32,7 +32,7 @@ fn build() -> PathBuf {
     for name in ["Cargo.toml", "Cargo.lock"] {
         fs::copy(root.join(name), tree.join(name)).expect("copied");
     }
-    // The manifest names tests and benches.
+    // The manifest refers to tests and benches.
     symlink(root.join("tests"), tree.join("tests")).expect("linked");
     fs::write(tree.join("src/effects/row_ripple.rs"), FILE).expect("written");
     let list = tree.join("src/effects/mod.rs");
@@ -80,7 +80,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// Exit code 1 is a mismatch.
+    /// Runs the program; exit code 1 is a mismatch.
     fn run(&self, arguments: &[&str]) -> Output {
         let mut command = Command::new(&self.program);
         let output =
@@ -97,7 +97,7 @@ impl Bench {
         serde_json::from_str(&text).expect("JSON")
     }
 
-    /// The paper's Eq. 1 with these effects.
+    /// Writes the paper's Eq. 1 with these effects.
     fn model(&self, name: &str, effects: Vec<Effect>) {
         let model = NoiseModel { effects, ..NoiseModel::paper() };
         model.write(&self.path(name)).expect("written");
@@ -139,7 +139,7 @@ fn an_effect_is_one_file_and_one_word() {
     let page = fs::read_to_string(bench.path("found/report.html")).expect("a page");
     assert!(page.contains("a ripple over the rows") && page.contains("height of the hum"));
 
-    // Known by its formula it is found no more, and both the shape and the formula take it out.
+    // With its formula in the model it is no longer found, and both the shape and the formula correct it.
     let numbers = [("amplitude_px", AMPLITUDE_PX), ("period_px", PERIOD_PX)];
     let parameters = numbers.map(|(name, value)| (name.to_string(), json!(value)));
     let parameters = parameters.into_iter().collect();

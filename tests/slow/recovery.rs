@@ -1,5 +1,5 @@
-//! Recovery with coverage: the paper's grid simulated from Eq. 1, through files and the whole
-//! pipeline, over many seeds.
+//! Recovery and coverage: the paper's grid simulated from Eq. 1, through files and the whole pipeline, over
+//! many seeds.
 
 use kinoise::io::{Assumed, open};
 use kinoise::measure::MeasureOptions;
@@ -9,7 +9,7 @@ use kinoise::simulate::{Grid, Shoot, kinect_v1};
 use kinoise::{CalibrateOptions, Calibration, Form, Measurements, Seed, SigmaKind, SigmaModel};
 
 const SEEDS: u64 = 200;
-/// Eq. 1 taken at its word wherever a board of this size reaches.
+/// Eq. 1 wherever a board of this size reaches.
 fn truth() -> SigmaModel {
     let domain = Domain { z_m: [0.2, 10.0], theta_rad: [0.0, 1.37] };
     SigmaModel::published(Form::Paper, &PAPER_EQ1, domain)
@@ -36,12 +36,12 @@ fn calibrated(seed: u64) -> (Measurements, Calibration) {
     (views, calibration)
 }
 
-/// The truth must lie inside the 95 % interval of the surface 93 to 97 % of the time over the
-/// paper's grid, and at no grid point less than 88 %; each parameter as often.
+/// The 95 % interval of the surface must cover the truth 93 to 97 % of the time over the paper's grid, and at
+/// every grid point at least 88 %; that of each parameter 90 to 98.5 %.
 ///
-/// False alarms: a grid point at exactly 95 % falls below 88 % of 200 with probability 4e-5
-/// (binomial), times 63 points: below 0.3 %. The average over the grid is steadier than one
-/// point; its standard error over seeds is about 1 % because points of a seed move together.
+/// False alarms: a grid point at exactly 95 % falls below 88 % of 200 with probability 4e-5 (binomial), times
+/// 63 points: below 0.3 %. The average over the grid varies less than one point; its standard error over
+/// seeds is about 1 % because the points of a seed are correlated.
 #[test]
 fn the_surface_covers_the_truth() {
     let grid = Grid::paper().views();

@@ -1,5 +1,5 @@
-//! Every effect of the catalogue, filmed at its typical size where it has something to act on, and
-//! diagnosed: what is printed of a finding must be an effect that the simulator takes.
+//! Every effect of the catalogue, simulated at its typical size where it has something to act on, and
+//! diagnosed: the effect printed for a finding must be accepted by the simulator.
 
 use kinoise::diagnose::{DiagnoseOptions, Finding, Status, diagnose};
 use kinoise::effects::{Active, CATALOGUE};
@@ -10,7 +10,7 @@ use kinoise::{NoiseModel, Seed, SigmaModel};
 
 use crate::common;
 
-/// The sensor of the demo at half its size, and its views.
+/// The demo's views, by its sensor at half the resolution.
 fn film(effect: Active, frames: usize) -> Shoot {
     let distances_m = vec![1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0];
     let tilts_rad = [0.0f64, 35.0, 60.0, 74.0].map(f64::to_radians).to_vec();
@@ -47,14 +47,14 @@ fn what_is_printed_of_every_named_finding_simulates() {
         let id = effect.card().id;
         for finding in findings(Active::typical(id).expect("known")) {
             let named = matches!(finding.status, Status::Named | Status::OneOf);
-            // What a few views have is told without a strength.
+            // An effect of only a few views is reported without a strength.
             let of_few =
                 finding.shape.as_deref().is_some_and(|s| s.starts_with("only in the views"));
             let Some(name) = finding.effect.filter(|_| named && !of_few) else { continue };
             let printed = finding.as_effect().map(|a| a.argument());
             println!("{id}: {name}: {printed:?}");
             let Some(Ok(read)) = printed.as_deref().map(Active::parse) else {
-                // A strength beyond what the formula takes, as a negative share, is not printed.
+                // A strength outside the formula's range, such as a negative share, is not printed.
                 let knob = kinoise::effects::find(name).expect("known").card().parameters[0];
                 let said = finding.parameters.get(knob.name).and_then(|v| v["value"].as_f64());
                 if said.is_none_or(|v| (knob.range[0]..=knob.range[1]).contains(&v)) {
@@ -72,6 +72,6 @@ fn what_is_printed_of_every_named_finding_simulates() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // So that this is not the test of an empty list.
+    // Guards against testing an empty list.
     assert!(2 * led.len() > CATALOGUE.len(), "{led:?}");
 }

@@ -1,5 +1,5 @@
-//! Whether a finished trial holds: hashes, questions, marks and scores from `proof.json` alone, the
-//! published files against it, and a sample of the sets made again.
+//! Checks a finished trial: hashes, questions, marks and scores from `proof.json` alone, the published files
+//! against it, and a sample of the sets made again.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use crate::rounds::{Progress, ROUNDS, Taken, each, remove, take, take_advised};
 use crate::solver::{Answer, solve};
 
 pub struct CheckOptions {
-    /// Real recordings; without them their sets are not made again.
+    /// Folder of real recordings; without it their sets are not made again.
     pub data: Option<PathBuf>,
     /// Make every set again.
     pub all: bool,
@@ -37,11 +37,11 @@ pub struct Checked {
     pub remarks: Vec<String>,
 }
 
-/// Sets that are made again at least, and one in so many.
+/// Size of the sample of sets made again: at least this many, and one in [`SAMPLE_IN`].
 const MIN_SAMPLE: usize = 3;
 const SAMPLE_IN: usize = 20;
 
-/// Check the trial in `folder`.
+/// Checks the trial in `folder`.
 pub fn check(folder: &Path, options: &CheckOptions, progress: Progress<'_>) -> Result<Checked> {
     let proof = Proof::read(folder)?;
     let planned = plan(&proof.order);
@@ -63,7 +63,7 @@ impl Checked {
         }
     }
 
-    /// The seed gives these questions, and the truths are those that were committed to.
+    /// Checks that the seed gives these questions and that the truths are those that were committed to.
     fn questions(&mut self, proof: &Proof, planned: &[Planned]) {
         let first = &proof.commitments[0];
         self.fault(sha256_hex(&proof.order.seed.to_le_bytes()) == first.seed_sha256, || {
@@ -83,7 +83,7 @@ impl Checked {
         self.checked.push(format!("{} questions and truths against seed and hashes", n[2]));
     }
 
-    /// The files that were published are what the proof says, each bound to the one before; every
+    /// Checks that the published files match the proof, that each is bound to the one before, and that every
     /// verdict is the diagnosis that was hashed.
     fn published(&mut self, folder: &Path, proof: &Proof) -> Result<()> {
         let mut before: Option<String> = None;
@@ -121,7 +121,7 @@ impl Checked {
                 n += 1;
             }
         }
-        // Trials before it was sealed say nothing of it set by set.
+        // Older trials do not record it per set.
         let sealed = !confinement.contains_key("");
         self.fault(!sealed || confinement == proof.confinement, || {
             "the solvers were confined in another way than proof.json says".into()
@@ -132,7 +132,7 @@ impl Checked {
         Ok(())
     }
 
-    /// The judge says the same again.
+    /// Checks that the judge gives the same marks and scores again.
     fn judgement(&mut self, proof: &Proof) {
         for set in &proof.sets {
             let said = set.answer.verdict.as_ref();
@@ -148,7 +148,7 @@ impl Checked {
         self.checked.push(format!("the marks of {} sets and all scores", proof.sets.len()));
     }
 
-    /// Sets made again give the same truth and the same bytes; so do advised views.
+    /// Checks that sets and advised views made again give the same truth and the same bytes.
     fn sets(
         &mut self,
         proof: &Proof,
@@ -162,7 +162,7 @@ impl Checked {
             planned.retain(|p| p.asked.world != World::Real);
         }
         if !options.all {
-            // Which, nobody can know before the commitments are written.
+            // Nobody can know the sample before the commitments are written.
             planned.shuffle(&mut seed_of(&proof.published[0]).stream("trial/check"));
             planned.truncate(MIN_SAMPLE.max(planned.len().div_ceil(SAMPLE_IN)));
         }
@@ -206,8 +206,8 @@ impl Checked {
     }
 }
 
-/// Diagnose the set in `scratch/set` again, and weigh the model that comes of it: what is another than
-/// the proof says, if anything is. An answer that took too long once may come in time now.
+/// Diagnoses the set in `scratch/set` again and examines its model; returns what differs from the proof, if
+/// anything. A set without an answer is skipped: it may have timed out, and finish now.
 fn derived(
     set: &Taken,
     proven: &ProvenSet,

@@ -1,4 +1,4 @@
-//! Hashes that bind everybody: of what the solver gets, of the answers, of what was said.
+//! Hashes that commit to the solver's input, the truths and the verdicts.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,37 +19,38 @@ use crate::raytraced::question::Pose;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Commitments {
     pub version: String,
-    /// Of the trial's seed as eight bytes, least first: take a large seed where others are to trust it.
+    /// SHA-256 of the trial's seed as eight little-endian bytes; choose a large seed where others are
+    /// to trust it.
     pub seed_sha256: String,
-    /// Of this program, which diagnoses and judges.
+    /// SHA-256 of this program, which diagnoses and judges.
     pub binary_sha256: String,
-    /// What the trial is judged by, in words.
+    /// The endpoints that the trial is judged by, in words.
     pub endpoints: Vec<String>,
     /// Wall-clock limit of one diagnosis, s.
     pub limit_s: u64,
-    /// Of the first round's verdicts; none in the first round.
+    /// SHA-256 of the first round's verdicts; `None` in the first round.
     pub after: Option<String>,
-    /// In the order in which they are put.
+    /// In the order of the plan.
     pub sets: Vec<Committed>,
 }
 
-/// One set, as far as anybody may know.
+/// What is published about one set before its diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Committed {
     pub name: String,
-    /// [`hash_folder`] of what the solver gets.
+    /// [`hash_folder`] of the solver's input.
     pub data_sha256: String,
-    /// [`hash_json`] of the truth, which holds the set's own 64-bit seed: nobody can guess it.
+    /// [`hash_json`] of the truth. It contains the set's own 64-bit seed, so nobody can guess it.
     pub truth_sha256: String,
-    /// In the second round: the view that was advised and the one that could be taken.
+    /// In the second round: the view that was advised and the one that was taken.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<[Pose; 2]>,
 }
 
-/// Published when all is said and nothing is opened: `verdicts.json`, `verdicts-advised.json`.
+/// Published before any answer is opened: `verdicts.json`, `verdicts-advised.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdicts {
-    /// Of the commitments that they answer.
+    /// SHA-256 of the commitments that these verdicts answer.
     pub commitments_sha256: String,
     pub verdicts: Vec<VerdictHash>,
 }
@@ -57,12 +58,12 @@ pub struct Verdicts {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VerdictHash {
     pub name: String,
-    /// Of `diagnosis.json`, every byte; none where no diagnosis came.
+    /// SHA-256 of `diagnosis.json`; `None` where there is no diagnosis.
     pub diagnosis_sha256: Option<String>,
-    /// Of the model with what was found, from which the gains follow.
+    /// SHA-256 of the extended model, from which the gains follow.
     #[serde(default)]
     pub model_sha256: Option<String>,
-    /// What kept the solver from the rest of the machine; older trials do not say it set by set.
+    /// What confined the solver; empty in older trials, which do not record it per set.
     #[serde(default)]
     pub confinement: String,
 }
@@ -78,8 +79,8 @@ pub fn hash_file(path: &Path) -> Result<String> {
     Ok(sha256_hex(&fs::read(path).map_err(|e| Error::read(path, e))?))
 }
 
-/// SHA-256 over all files below `root` in the order of their paths: for each the path with '/', a
-/// zero byte, its length as eight bytes, least first, and its bytes.
+/// SHA-256 over all files below `root` in path order: for each the path with '/', a zero byte, its length as
+/// eight little-endian bytes, and its contents.
 pub fn hash_folder(root: &Path) -> Result<String> {
     let mut files = BTreeMap::new();
     list(root, "", &mut files)?;
@@ -110,7 +111,7 @@ fn list(folder: &Path, above: &str, files: &mut BTreeMap<String, PathBuf>) -> Re
 
 const REMEDY: &str = "give the folder of a trial made by this version";
 
-/// What a JSON file holds, and the hash of its bytes.
+/// Reads a JSON file; returns its value and the SHA-256 of its bytes.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     let bytes = fs::read(path).map_err(|e| Error::read(path, e))?;
     let value = serde_json::from_slice(&bytes).map_err(|e| Error::Text {
@@ -122,7 +123,7 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     Ok((value, sha256_hex(&bytes)))
 }
 
-/// Write whole or not at all; the hash of the bytes.
+/// Writes the file whole or not at all; returns the SHA-256 of its bytes.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<String> {
     Ok(sha256_hex(kinoise::io::write_json(path, value, REMEDY)?.as_bytes()))
 }

@@ -1,9 +1,9 @@
-//! The examination: how much better than the model file does somebody predict views they never saw,
-//! against somebody who knows the truth?
+//! Examination: how much better than the model file does a method predict unseen views, compared with an
+//! oracle that knows the truth?
 //!
-//! The score is exact, without drawing noise. A user corrects the depth and fits a plane, so errors
-//! that a plane takes up cost nothing; what is left, e, and the true noise, sigma, are scored under
-//! the predicted noise s:
+//! The score is exact: no noise is drawn. A user corrects the depth and fits a plane, so errors that a
+//! plane absorbs cost nothing. The remaining error e and the true noise, sigma, are scored under the
+//! predicted noise s:
 //!
 //! ```text
 //! E[log N(e + noise; 0, s^2)] = -(e^2 + sigma^2) / (2 s^2) - ln s   (+ a constant)
@@ -22,10 +22,9 @@ use crate::predictor::ModelPredictor;
 use crate::raytraced::geometry::least_squares;
 use crate::raytraced::question::ExamView;
 
-/// What somebody learnt from a recording, put to use on a view they never saw. Who learnt nothing
-/// believes the model file.
+/// What a method learnt from a recording, applied to an unseen view. By default the model file is believed.
 pub trait Predictor {
-    /// Take the predicted bias out of `depth` (m, NaN where there is none).
+    /// Removes the predicted bias from `depth` (m, NaN where there is none).
     fn correct(&self, _view: &ExamView, _depth: &mut [f32]) -> Result<()> {
         Ok(())
     }
@@ -36,12 +35,12 @@ pub trait Predictor {
     }
 }
 
-/// Who believes the model file.
+/// Believes the model file.
 struct Unaware;
 
 impl Predictor for Unaware {}
 
-/// Who knows the truth: exact bias, exact noise.
+/// Knows the truth: exact bias, exact noise.
 struct Oracle;
 
 impl Predictor for Oracle {
@@ -55,28 +54,28 @@ impl Predictor for Oracle {
     }
 }
 
-/// Expected log score beyond that of the model file alone, nats per 1000 pixels, mean over the
-/// views. Zero where there is no such view.
+/// Expected log score minus that of the model file alone, nats per 1000 pixels, mean over the views. Zero
+/// where there are no such views.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
-    /// Views like the recording's.
+    /// Views within the recording's distances and tilts.
     pub within: f64,
     /// Views outside its distances or tilts.
     pub beyond: f64,
 }
 
-/// All methods beside who knows the truth.
+/// Gains of the oracle and of all methods.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
     pub oracle: Gain,
     pub methods: BTreeMap<String, Gain>,
 }
 
-/// Under this name the diagnosis itself stands among the methods.
+/// Name of the diagnosis itself among the methods.
 pub const OUR_METHOD: &str = "kinoise";
 
-/// Weigh the model that was `found` from the set in `folder` (`recording/` beside `model.json`) on
-/// fresh views, at least one, with the baselines on the same recording when asked for.
+/// Gains on fresh views, at least one, of the model `found` from the set in `folder` (`recording/` beside
+/// `model.json`); with `baselines`, also of the baselines on the same recording.
 pub fn examine(
     views: &[ExamView],
     folder: &Path,
@@ -97,9 +96,9 @@ pub fn examine(
 
 /// Per 1000 pixels.
 const PIXELS: f64 = 1000.0;
-/// No depth sensor is surer than this, m: a world without noise has no infinite score.
+/// Lower limit of sigma, m, below that of any depth sensor: keeps the score finite in a world without noise.
 const MIN_SIGMA_M: f64 = 1e-6;
-/// A plane through fewer pixels than this says nothing.
+/// Minimum number of pixels for a plane.
 const MIN_PIXELS: usize = 12;
 
 /// Gain of a prediction over the model file alone.
@@ -127,17 +126,17 @@ struct Scored {
     predicted: f64,
 }
 
-/// Mean over the pixels of the target, nats; `None` where there are too few for a plane.
+/// Mean score over the pixels of the target, nats; `None` where there are too few for a plane.
 ///
-/// Where the model file alone leaves an error on the plane, one that it knows of, everybody knows
-/// it: errors are counted from `plain`.
+/// Errors are counted from `plain`: an error that the model file alone leaves on the plane is known to
+/// every method.
 fn score(view: &ExamView, predictor: &dyn Predictor) -> Result<Option<f64>> {
     let pixels = pixels(view, predictor)?;
     if pixels.len() < MIN_PIXELS {
         return Ok(None);
     }
-    // What the user's plane takes of the error: affine in inverse depth, weighed by the predicted
-    // variance; an error of depth by s is one of inverse depth by s / z^2.
+    // What the user's plane absorbs: affine in inverse depth, weighted by the inverse predicted variance; a
+    // depth error s is an inverse-depth error s / z^2.
     let row = |p: &Scored| (p.ray, p.error, (p.z * p.z / p.predicted).powi(2));
     let plane = least_squares(pixels.iter().map(row));
     let Some(q) = plane.filter(|q| q.iter().all(|v| v.is_finite())) else { return Ok(None) };

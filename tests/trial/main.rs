@@ -1,11 +1,12 @@
-//! The blind trial of `kinoise diagnose`, as an example that sees the public library alone:
+//! Blind trial of `kinoise diagnose`, as an example that uses only the public library:
 //! `./run prove -o DIR [--sets N] [--seed S] [--data RECORDINGS]`, `--check DIR`, `--page DIR`; in parts
 //! by `--shard I/N -o DIR` on each machine, then `--merge DIR1 DIR2 ... -o DIR`.
 //!
-//! Makers of concealed sets share no formula with the catalogue and no code with the diagnosis
-//! ([`raytraced`], the speckle simulator, and real recordings). Their data and answers are hashed before the first
-//! diagnosis, the verdicts before the first answer is opened; a process that can reach one set and
-//! nothing else diagnoses it; endpoints are chosen before; every failure is on the page.
+//! The makers of simulated sets ([`raytraced`] and the speckle simulator) share no formula with the
+//! catalogue and no code with the diagnosis; other sets are made of real recordings. Data and answers
+//! are hashed before the first diagnosis, the verdicts before the first answer is opened. A process
+//! that can reach one set and nothing else diagnoses it. Endpoints are chosen in advance; every failure
+//! is on the page.
 
 #![forbid(unsafe_code)]
 
@@ -115,11 +116,11 @@ struct Arguments {
     threads: Option<usize>,
 }
 
-/// A trial that does not hold; bad input or failure.
+/// Exit codes: a trial that does not hold; bad input or failure.
 const DOES_NOT_HOLD: u8 = 1;
 const FAILURE: u8 = 2;
 
-/// More than any machine has.
+/// Upper limit of `--threads`: more than any machine has.
 const MAX_THREADS: usize = 1024;
 
 fn main() -> ExitCode {
@@ -220,7 +221,7 @@ fn print_json(arguments: &Arguments, value: &impl serde::Serialize) -> anyhow::R
     Ok(())
 }
 
-/// One bar after the other on a terminal, nothing elsewhere.
+/// Progress bars one after another on a terminal; prints nothing elsewhere.
 fn bar() -> anyhow::Result<impl Fn(&'static str, usize, usize) + Sync> {
     let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta}")?;
     let bar = ProgressBar::new(0).with_style(style);

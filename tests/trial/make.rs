@@ -1,8 +1,8 @@
-//! `trial make OUT --cell CELL ...`: raytraced sets as the trial makes them, for goldens and a look.
+//! Makes concealed sets as the trial does, for goldens and for inspection: `trial make OUT --cell CELL ...`.
 //!
-//! With `--nats` or `--sealed` a set is the trial's: 320x240, `--small` 160x120; else it is of one
-//! strength: 640x480, `--small` 320x240. With `--light` it is made of dots, `--effect` names a cause,
-//! and `OUT/<name>/` holds `recording/` and `simulated/`.
+//! With `--nats` or `--sealed` a set is as in the trial: 320x240, `--small` 160x120; otherwise it has one
+//! strength: 640x480, `--small` 320x240. With `--light` it is made by the speckle simulator, `--effect`
+//! names a cause, and `OUT/<name>/` holds `recording/` and `simulated/`.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -51,7 +51,7 @@ fn cell(text: &str) -> Result<Cell, String> {
     serde_json::from_value(text.into()).map_err(|_| format!("no cell is called \"{text}\""))
 }
 
-/// Into `OUT/<name>/`, `OUT/truth/` and, where there is one, `OUT/model/`. What was made.
+/// Makes one set in `OUT/<name>/`, `OUT/truth/` and, unless by light, `OUT/model/`; returns a summary.
 fn make(a: &Arguments, names: Vec<String>, seed: u64) -> anyhow::Result<String> {
     let Arguments { cell, nats, strength, views, frames, small, .. } = *a;
     let world = if a.light { World::Light } else { World::Rays };

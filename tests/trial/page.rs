@@ -1,5 +1,5 @@
-//! The page of a trial, for somebody who does not believe it: the marks, the power, every
-//! failure, and how to check all of it. And the same in a few lines for the terminal.
+//! The page of a trial, for sceptics: the marks, the power, every failure and how to check it all. Also a
+//! summary of a few lines for the terminal.
 
 use std::fmt::Write as _;
 use std::time::{Duration, SystemTime};
@@ -12,7 +12,7 @@ use crate::judge::{ByStrength, Endpoint, Level, QUESTIONS, Rate, Ratio, level, w
 use crate::proof::{Proof, ProvenSet};
 use crate::reliance::reliance;
 
-/// The questions of the table by kind: the mark, its head.
+/// Columns of the table by kind of set: question and heading.
 const COLUMNS: [(&str, &str); 10] = [
     ("false_alarm", "alarm"),
     ("detected", "seen"),
@@ -26,7 +26,7 @@ const COLUMNS: [(&str, &str); 10] = [
     ("confident_wrong", "sure, wrong"),
 ];
 
-/// A table by kind of set, and the five endpoints.
+/// Table by kind of set and the five endpoints, as text for the terminal.
 pub fn summary(proof: &Proof) -> String {
     let scores = &proof.scores;
     let mut text = format!("{:<22}", format!("{} sets", scores.sets));
@@ -45,7 +45,7 @@ pub fn summary(proof: &Proof) -> String {
     text
 }
 
-/// The page as text: one self-contained file.
+/// The page as one self-contained HTML file.
 pub fn page(proof: &Proof) -> String {
     const TITLE: &str = "A blind trial of kinoise diagnose";
     let scores = &proof.scores;
@@ -121,7 +121,7 @@ fn endpoints(proof: &Proof) -> Markup {
     section("The five marks, chosen beforehand", &table(&heads, rows))
 }
 
-/// Rows by name, columns by strength, a cell as dark as its share.
+/// Table of rates: rows by name, columns by strength, cells shaded by the rate.
 fn power(title: &str, rows: &ByStrength, question: &str) -> Markup {
     let mut levels: Vec<&String> = rows.values().flat_map(|r| r.keys()).collect();
     levels.sort();
@@ -196,7 +196,7 @@ fn confusion(proof: &Proof) -> Markup {
     )
 }
 
-/// Questions of which the answer is not what it should be.
+/// Questions with a wrong answer.
 fn failed(set: &ProvenSet) -> Vec<&'static str> {
     let asked = QUESTIONS.iter().map(|q| q.0);
     let wrong = |question: &&str| {

@@ -1,4 +1,4 @@
-//! Which questions a trial puts, evenly over effects and strengths; and who makes a set of each.
+//! The questions of a trial, spread evenly over effects and strengths, and the maker of each set.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use kinoise::error::Result;
 use kinoise::io::hex;
 use kinoise::rng::{Seed, Stream};
 
-/// One question of a trial, and its name that says nothing.
+/// One question of a trial, with a name that reveals nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
     pub name: String,
@@ -26,19 +26,19 @@ pub struct Planned {
 struct Share {
     world: World,
     cell: Cell,
-    /// Of about 1,500.
+    /// Share of the trial; all weights sum to about 1,500.
     weight: f64,
-    /// Each in turn; by the world's lot where none is named.
+    /// Used in turn; where empty, the world chooses at random.
     names: &'static [&'static str],
-    /// Each in turn.
+    /// Used in turn.
     nats: &'static [f64],
 }
 
-/// Nats over a whole recording. A million readings make 50 nats of a bias of 1 % of the noise, and
-/// 5000 of one of 10 %: the upper two are what a user would care about.
+/// Strengths, nats over a whole recording. With a million readings, a bias of 1 % of the noise is worth 50
+/// nats and one of 10 % is worth 5000: the upper two are what a user would care about.
 const ALL: &[f64] = &[5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
 const UPPER: &[f64] = &[50.0, 150.0, 500.0, 5000.0];
-/// Sizes of a cause of the world of light, which has no nats.
+/// Sizes of a cause in the light world, which has no nats.
 const SIZES: &[f64] = &[15.0, 50.0, 150.0];
 
 const fn share(world: World, cell: Cell, weight: f64, nats: &'static [f64]) -> Share {
@@ -65,13 +65,13 @@ static SHARES: [Share; 17] = [
     share(World::Real, Cell::Halves, 10.0, &[]),
 ];
 
-/// What is known of the real recordings in the folder `data`, where one of these questions asks.
+/// Learns the real recordings in the folder `data`, if any of these questions needs one.
 pub fn learn(planned: &[Planned], data: Option<&Path>) -> Result<Vec<Arc<Full>>> {
     let data = data.filter(|_| planned.iter().any(|p| p.asked.world == World::Real));
     data.map_or(Ok(Vec::new()), real::learn)
 }
 
-/// The set that is `asked`, of one of the `known` real recordings where it is to be real.
+/// Makes the set that is `asked`; a real one is made from one of the `known` recordings.
 pub fn conceal(asked: &Asked, known: &[Arc<Full>]) -> Result<Box<dyn ConcealedSet>> {
     match asked.world {
         World::Rays => raytraced::conceal(asked),
@@ -80,7 +80,7 @@ pub fn conceal(asked: &Asked, known: &[Arc<Full>]) -> Result<Box<dyn ConcealedSe
     }
 }
 
-/// The questions of a trial, in the order in which they are put.
+/// The questions of a trial, in the order in which they are asked.
 pub fn plan(order: &Order) -> Vec<Planned> {
     let mut rng = Seed(order.seed).stream("prove/plan");
     let mut asked: Vec<Asked> = Vec::with_capacity(order.sets);
@@ -90,14 +90,15 @@ pub fn plan(order: &Order) -> Vec<Planned> {
     asked.shuffle(&mut rng);
     let planned = |(i, asked)| {
         let mut rng = Seed(order.seed).stream(&format!("prove/set/{i}"));
-        // The first 32 bytes once were a salt; without them all sets would be others.
+        // The first 32 bytes were once a salt; without drawing them all sets would change.
         let (_, name, seed): ([u8; 32], [u8; 6], u64) = rng.random();
         Planned { name: hex(&name), asked: Asked { seed, ..asked } }
     };
     asked.into_iter().enumerate().map(planned).collect()
 }
 
-/// How many of each kind. Nobody can count on the number of empty sets: it is drawn around its share.
+/// Number of questions of each kind. The number of empty sets is drawn around its share, so that nobody
+/// can rely on it.
 fn counts(order: &Order, rng: &mut Stream) -> Vec<(&'static Share, usize)> {
     let emptier: f64 = rng.random_range(0.75..1.25);
     let weight = |s: &Share| match s.cell {
@@ -110,7 +111,7 @@ fn counts(order: &Order, rng: &mut Stream) -> Vec<(&'static Share, usize)> {
     let quota: Vec<f64> = kinds.iter().map(|s| order.sets as f64 * weight(s) / total).collect();
     let min = usize::from(order.sets >= 2 * kinds.len());
     let mut count: Vec<usize> = quota.iter().map(|q| (*q as usize).max(min)).collect();
-    // Whoever is furthest below its quota gets the next; whoever is furthest above gives.
+    // The kind furthest below its quota gets one more; the kind furthest above gives one up.
     loop {
         let given: usize = count.iter().sum();
         let off = |i: &usize| quota[*i] - count[*i] as f64;
@@ -128,7 +129,7 @@ fn counts(order: &Order, rng: &mut Stream) -> Vec<(&'static Share, usize)> {
     kinds.into_iter().zip(count).collect()
 }
 
-/// Any stretch of these covers names and strengths evenly; one image in eight is large.
+/// Questions of one kind: any run of them covers names and strengths evenly; one image in eight is large.
 fn questions(share: &Share, count: usize, rng: &mut Stream) -> Vec<Asked> {
     let mut names: Vec<&str> = share.names.to_vec();
     names.shuffle(rng);
@@ -142,7 +143,7 @@ fn questions(share: &Share, count: usize, rng: &mut Stream) -> Vec<Asked> {
         names: names.get(i % n).map(ToString::to_string).into_iter().collect(),
         nats: share.nats.get((first + i + i / together) % strengths).copied(),
         seed: 0,
-        // Not in step with the strengths.
+        // Out of step with the strengths.
         small: !(i + i / 8 + large).is_multiple_of(8),
     };
     (0..count).map(question).collect()

@@ -1,4 +1,4 @@
-//! A model file put to use on a view: its biases taken out, its noise predicted.
+//! A model file applied to a view: removes its biases and predicts its noise.
 
 use kinoise::camera::{Camera, Rays};
 use kinoise::correct::Correction;
@@ -16,8 +16,8 @@ use crate::gain::Predictor;
 use crate::raytraced::geometry::least_squares;
 use crate::raytraced::question::ExamView;
 
-/// The plane through a picture's depth (m, NaN where there is none), with weights that are even in
-/// disparity; `None` where there is none.
+/// Plane through a depth image (m, NaN where there is none), with weights uniform in disparity; `None` where
+/// no plane can be fitted.
 pub fn plane_of(depth: &[f32], camera: &Camera, rays: &Rays) -> Option<Plane> {
     let seen = depth.iter().take(camera.pixels()).enumerate();
     let rows = seen.filter(|(_, z)| **z > 0.0 && z.is_finite()).map(|(i, z)| {
@@ -32,22 +32,22 @@ pub fn scale_px_m(sensor: &Sensor) -> f64 {
     sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M)
 }
 
-/// A model's biases are taken out; its sigma and its terms of the variance predict the noise.
+/// Removes a model's biases; predicts the noise by its sigma and its variance terms.
 pub struct ModelPredictor {
     correction: Correction,
     sigma: SigmaModel,
-    /// Of the logarithm of the disparity's variance.
+    /// Terms of the log-variance of the disparity.
     variance: Vec<Term>,
     rays: Rays,
     scale_px_m: f64,
 }
 
-/// Of the logarithm of a variance: no prediction calls noise ten times what the model file does, or
-/// a tenth.
+/// Limit of the log-variance: predicted noise stays within a factor of ten of the model file's.
 const MAX_LOG_VARIANCE: f64 = 4.6;
 
 impl ModelPredictor {
-    /// Biases that the `given` model has as well are left in the depth: all methods know them.
+    /// Predictor of `model`. Biases that the `given` model has as well stay in the depth: all
+    /// methods know them.
     pub fn beyond(given: &NoiseModel, model: &NoiseModel, sensor: &Sensor) -> Result<Self> {
         let is_new = |e: &&Effect| !given.effects.contains(e);
         let effects = model.effects.iter().filter(is_new).cloned().collect();

@@ -1,5 +1,5 @@
-//! `proof.json`: everything that was committed to, said, opened and counted; and `summary.json`, a
-//! row a set, for whoever has questions of their own.
+//! `proof.json`: commitments, answers, truths and scores of a finished trial; and `summary.json`, one row
+//! per set, for readers with questions of their own.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,30 +25,30 @@ pub struct Proof {
     pub format: String,
     pub order: Order,
     pub scores: Scores,
-    /// Of the four files as they were written, each before what it commits to: the first round's
-    /// commitments and verdicts, then the second's.
+    /// SHA-256 of the four published files: the first round's commitments and verdicts, then the second's.
+    /// Each file was written before the step that it commits to.
     pub published: Vec<String>,
     pub commitments: [Commitments; 2],
-    /// What kept the solver from the rest of the machine, and for how many sets.
+    /// What confined the solver, and in how many diagnoses.
     pub confinement: BTreeMap<String, usize>,
-    /// In the order in which they were put.
+    /// In the order of the plan.
     pub sets: Vec<ProvenSet>,
 }
 
-/// What the trial was made from: the same again gives the same sets.
+/// What the trial was made from; the same order gives the same sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Order {
     pub sets: usize,
     pub seed: u64,
-    /// With real recordings.
+    /// Whether some sets are made of real recordings.
     pub real: bool,
 }
 
-/// The largest trial so far had 1000; a set takes seconds of a core, so many as this a week.
+/// The largest trial so far had 1000; at seconds of a core per set, this many take a week.
 const MAX_SETS: usize = 100_000;
 
 impl Order {
-    /// An error when nobody can hold a trial of so many sets: the plan alone would fill the memory.
+    /// Fails on zero sets, and on so many that the plan alone would fill the memory.
     pub fn check(&self) -> Result<()> {
         if (1..=MAX_SETS).contains(&self.sets) {
             return Ok(());
@@ -58,7 +58,7 @@ impl Order {
     }
 }
 
-/// One set with everything about it.
+/// Everything recorded about one set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProvenSet {
     pub name: String,
@@ -67,14 +67,14 @@ pub struct ProvenSet {
     pub answer: Answer,
     pub marks: Marks,
     pub gains: Option<Gains>,
-    /// What came of the view that the diagnosis asked for.
+    /// Outcome with the view that the diagnosis asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub advised: Option<Advised>,
-    /// The diagnosis took so long; nothing else here depends on the machine.
+    /// Duration of the diagnosis; nothing else here depends on the machine.
     pub seconds: f64,
 }
 
-/// The set once more, with the view that was advised.
+/// The set diagnosed again with the advised view.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Advised {
     #[serde(flatten)]
@@ -83,7 +83,7 @@ pub struct Advised {
 }
 
 impl Proof {
-    /// Read `proof.json` of a folder.
+    /// Reads `proof.json` of a folder.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(PROOF);
         let (proof, _): (Proof, _) = read_json(&path)?;
@@ -99,7 +99,7 @@ impl Proof {
         Ok(proof)
     }
 
-    /// The sets of a round, 0 or 1, and what was said to them.
+    /// The sets of a round, 0 or 1, with their answers.
     pub fn answers(&self, round: usize) -> impl Iterator<Item = (&ProvenSet, &Answer)> {
         self.sets.iter().filter_map(move |set| {
             let answer = if round == 0 { &set.answer } else { &set.advised.as_ref()?.answer };
@@ -107,7 +107,7 @@ impl Proof {
         })
     }
 
-    /// A row a set: the truth, what was said, how it was judged.
+    /// One row per set: the truth, the findings and the marks.
     pub fn summary(&self) -> Value {
         json!({"order": self.order, "scores": self.scores,
             "sets": self.sets.iter().map(row).collect::<Vec<_>>()})

@@ -1,4 +1,4 @@
-//! What a user may rely on and what not, as sentences with their figures: the page's first part.
+//! First part of the page: what a user may and may not rely on, in sentences with figures.
 
 use std::collections::BTreeMap;
 
@@ -8,11 +8,11 @@ use maud::{Markup, html};
 use crate::judge::{Level, Rate, Rates};
 use crate::proof::Proof;
 
-/// Four of five: the power that a test is usually asked for, and the mark of a right first name.
+/// Threshold of "mostly", four of five: the usual power of a test, and the mark for a right first name.
 const MOSTLY: f64 = 0.8;
 /// A name that is stated with this probability or more is stated as certain.
 const CERTAIN: f64 = 0.9;
-/// Of fewer sets nothing is said.
+/// Minimum number of times that a name must be stated to be listed.
 const MIN_SETS: usize = 5;
 
 /// A sentence, and whether it is good news.
@@ -44,7 +44,7 @@ fn of(rate: &Rate) -> String {
     format!("{} of {} ({low} to {high} %)", rate.k, rate.n)
 }
 
-/// The figures that had a mark beforehand.
+/// The endpoints, chosen in advance.
 fn endpoints(proof: &Proof) -> Vec<Line> {
     let line = |e: &crate::judge::Endpoint| {
         let (value, [low, high]) = (e.value?, e.interval?);
@@ -80,7 +80,7 @@ fn endpoints(proof: &Proof) -> Vec<Line> {
     proof.scores.endpoints.iter().filter_map(line).collect()
 }
 
-/// From which strength on single causes are mostly seen.
+/// Strength from which single causes are mostly seen.
 fn seen(proof: &Proof) -> Vec<Line> {
     let Some(levels) = proof.scores.by_strength.get("rays/single") else { return Vec::new() };
     let rates: Vec<(&str, &Rate)> = levels
@@ -107,7 +107,7 @@ fn seen(proof: &Proof) -> Vec<Line> {
     strong.into_iter().chain(missed).collect()
 }
 
-/// Stated names, by their probability and one by one.
+/// How often stated names are right, by probability and by name.
 fn names(proof: &Proof) -> Vec<Line> {
     let stated = || proof.sets.iter().flat_map(|s| &s.marks.stated);
     let certain = Rate::of(stated().filter(|s| s.probability >= CERTAIN).map(|s| s.right));
@@ -145,7 +145,7 @@ fn names(proof: &Proof) -> Vec<Line> {
     lines
 }
 
-/// Intervals, blindness, a changed unit, advised views.
+/// Interval coverage, alarms on halves, blindness, changed units, advised views.
 fn other(proof: &Proof) -> Vec<Line> {
     let scores = &proof.scores;
     let kind = |kind: &str, question: &str| -> Option<&Rate> {

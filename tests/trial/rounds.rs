@@ -1,6 +1,5 @@
-//! One pass over sets: they are made, committed to, diagnosed, and the verdicts published. The trial
-//! is two of these; whatever is finished is kept under `work/`, so that an interrupted trial goes on
-//! where it was.
+//! One round over sets: make them, commit to them, diagnose them and publish the verdicts. A trial has two
+//! rounds. Finished work is kept under `work/`, so that an interrupted trial can resume.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,26 +22,27 @@ use crate::raytraced::question::{ConcealedSet, Pose, Truth, World};
 use crate::solver::{Solved, solve};
 use crate::trial::Trial;
 
-/// What happens, how many are done, how many there are.
+/// Current step, number done, total.
 pub type Progress<'a> = &'a (dyn Fn(&'static str, usize, usize) + Sync);
 
-/// A set that is ready, with its answer.
+/// A set that is ready, with its truth.
 pub struct Taken {
     pub name: String,
     pub truth: Truth,
     pub sealed: Box<dyn ConcealedSet>,
-    /// In the second round: the view that was advised and the one that could be taken.
+    /// In the second round: the view that was advised and the one that was taken.
     pub view: Option<[Pose; 2]>,
 }
 
-/// The two rounds: files and folders of the second have this in their names.
+/// Suffixes of the files and folders of the two rounds.
 pub const ROUNDS: [&str; 2] = ["", "-advised"];
-/// Sets of a second round at most, in the order of the trial.
+/// Maximum number of sets in the second round, in the order of the trial.
 const MAX_ADVISED: usize = 40;
-/// The baselines learn from one set in so many, by the set's seed: they take longer than all else.
+/// The baselines learn from one set in this many, chosen by the set's seed: they take longer than
+/// everything else.
 const BASELINES_IN: u64 = 3;
 
-/// The sets of these questions, made anew; `data` is the folder of the real recordings.
+/// Makes the planned sets; `data` is the folder of the real recordings.
 pub fn take(
     planned: &[Planned],
     data: Option<&Path>,
@@ -55,8 +55,8 @@ pub fn take(
     })
 }
 
-/// The sets whose verdicts advise a view, with that view; a session that a real sensor has long
-/// ended takes none.
+/// The sets whose verdicts advise a view, with that view added. Real recordings are skipped: their sessions
+/// ended long ago.
 pub fn take_advised<'a>(
     sets: &[Taken],
     verdicts: impl Iterator<Item = Option<&'a serde_json::Value>>,
@@ -77,7 +77,7 @@ pub fn take_advised<'a>(
 }
 
 impl Taken {
-    /// Write the set's folder into `scratch/set`, and only it; what anybody may know of it.
+    /// Clears `scratch` and writes the set into `scratch/set`; returns what may be published of it.
     pub fn make(&self, scratch: &Path) -> Result<Committed> {
         remove(scratch)?;
         let set = scratch.join("set");
@@ -87,8 +87,7 @@ impl Taken {
         Ok(Committed { name, data_sha256: hash_folder(&set)?, truth_sha256, view: self.view })
     }
 
-    /// What `model` gains on views nobody has seen, where the set has any; the set lies in
-    /// `scratch/set`.
+    /// Gain of `model` on the set's exam views; `None` where it has none. The set must lie in `scratch/set`.
     pub fn gains(&self, scratch: &Path, model: &NoiseModel) -> Result<Option<Gains>> {
         let views = self.sealed.exam();
         if views.is_empty() {
@@ -99,17 +98,17 @@ impl Taken {
     }
 }
 
-/// One pass over sets: committed to, diagnosed, published.
+/// One round over sets: commits, diagnoses and publishes.
 #[derive(Clone, Copy)]
 pub struct Round<'a> {
     pub trial: &'a Trial,
     pub binary_sha256: &'a str,
-    /// In [`ROUNDS`].
+    /// Index into [`ROUNDS`].
     pub index: usize,
     pub progress: Progress<'a>,
 }
 
-/// What a round leaves, and the hashes of the two files that it published.
+/// Outcome of a round, and the hashes of the two files that it published.
 pub struct Done {
     pub commitments: Commitments,
     pub solved: Vec<Solved>,
@@ -121,14 +120,14 @@ impl Round<'_> {
         self.trial.output.join(format!("{stem}{}", ROUNDS[self.index]))
     }
 
-    /// A set's file in a folder that is there from now on.
+    /// Path of a set's file in `folder`, which is created if missing.
     fn file(&self, folder: &str, name: &str) -> Result<PathBuf> {
         let folder = self.named(folder);
         make_folder(&folder)?;
         Ok(folder.join(format!("{name}.json")))
     }
 
-    /// What is known of a set from before an interruption, else the outcome of `work`, kept.
+    /// Result of `work` for a set: read back if stored by an interrupted run, else computed and stored.
     fn once<T: Serialize + DeserializeOwned>(
         &self,
         kind: &str,
@@ -144,14 +143,14 @@ impl Round<'_> {
         Ok(outcome)
     }
 
-    /// Nothing of an interrupted process, which may still write, is in the way.
+    /// Scratch folder of this process: an interrupted one may still write to its own.
     fn scratch(&self, name: &str) -> PathBuf {
         self.trial.output.join("work/scratch").join(std::process::id().to_string()).join(name)
     }
 
     pub fn run(&self, sets: &[Taken], after: Option<&str>) -> Result<Done> {
         let committed = each(sets, ("hashing sets", self.progress), |set| {
-            // By its truth: another trial's set of this name is no help.
+            // Keyed by the truth: another trial may have a set of the same name.
             self.once("commitments", &hash_json(&set.truth), || {
                 let scratch = self.scratch(&set.name);
                 let committed = set.make(&scratch)?;
@@ -215,7 +214,7 @@ impl Round<'_> {
         Ok(solved)
     }
 
-    /// What each model that was found gains on views nobody has seen.
+    /// Gain of each extended model on the set's exam views.
     pub fn examine_all(&self, sets: &[Taken], known: &Commitments) -> Result<Vec<Option<Gains>>> {
         let pairs: Vec<(&Taken, &Committed)> = sets.iter().zip(&known.sets).collect();
         each(&pairs, ("examining", self.progress), |(set, committed)| {
@@ -231,7 +230,7 @@ impl Round<'_> {
         })
     }
 
-    /// Where the set is that was committed to, and no other.
+    /// Makes the set again, checks it against its commitment and returns its folder.
     fn remade(&self, set: &Taken, committed: &Committed) -> Result<PathBuf> {
         let scratch = self.scratch(&set.name);
         if set.make(&scratch)? == *committed {
@@ -244,7 +243,8 @@ impl Round<'_> {
     }
 }
 
-/// `work` on every item on all threads, in order of the items. Nothing new is begun after a failure.
+/// Runs `work` on all items in parallel; results keep the order of the items. No new item is started
+/// after a failure.
 pub fn each<T: Sync, R: Send>(
     items: &[T],
     (what, progress): (&'static str, Progress<'_>),
@@ -257,7 +257,7 @@ pub fn each<T: Sync, R: Send>(
         progress(what, done.fetch_add(1, Ordering::Relaxed) + 1, items.len());
         result
     };
-    // One at a time for each thread: sets differ much in size.
+    // One item per task: sets differ much in size.
     items.par_iter().with_max_len(1).map(one).collect()
 }
 

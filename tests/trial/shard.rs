@@ -1,7 +1,7 @@
-//! A trial in parts, each on its own machine: a shard makes, commits to, diagnoses and examines every
-//! n-th set of the plan. The merge puts what the shards wrote where an interrupted trial would have
-//! left it, and goes on from there: the second round, which depends on all verdicts of the first, and
-//! the judge run there. So a merged trial is the single one, byte for byte but for the seconds.
+//! A trial in parts, each on its own machine: a shard makes, commits to, diagnoses and examines every n-th
+//! set of the plan. The merge puts the shards' files where an interrupted trial would have left them and
+//! resumes from there: the second round, which depends on all verdicts of the first, and the judge run
+//! there. So a merged trial equals the single one byte for byte, except for the seconds.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,14 +18,14 @@ use crate::proof::{Order, PROOF};
 use crate::rounds::{Progress, Round, refused, take};
 use crate::trial::Trial;
 
-/// Written last: a shard that is interrupted has none.
+/// Written last: an interrupted shard has none.
 const SHARD: &str = "shard.json";
 const FORMAT: &str = "kinoise-shard/1";
-/// Folders of a shard that an interrupted trial would have, too.
+/// Folders of a shard that an interrupted trial would have too.
 const FOLDERS: [&str; 6] =
     ["work/commitments", "work/verdicts", "work/models", "work/gains", "diagnoses", "kept"];
 
-/// Which part of how many, counted from one.
+/// Part `index` of `of`, counted from one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     pub index: usize,
@@ -45,26 +45,26 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// Every n-th of the plan, so that all shards have about the same mixture.
+    /// Every n-th set of the plan, so that all shards have about the same mixture.
     fn part(self, planned: Vec<Planned>) -> Vec<Planned> {
         planned.into_iter().skip(self.index - 1).step_by(self.of).collect()
     }
 }
 
-/// What a finished shard says of itself.
+/// Description of a finished shard.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Finished {
     format: String,
     shard: Shard,
-    /// Of the whole trial.
+    /// Order of the whole trial.
     order: Order,
     binary_sha256: String,
     limit_s: u64,
-    /// Of commitments.json and verdicts.json as they were written.
+    /// SHA-256 of `commitments.json` and `verdicts.json`.
     published: [String; 2],
 }
 
-/// Hold one part of the trial, or go on with one that was interrupted.
+/// Runs one part of the trial, or resumes one that was interrupted.
 pub fn hold_shard(trial: &Trial, shard: Shard, progress: Progress<'_>) -> Result<()> {
     let planned = shard.part(plan(&trial.order));
     if planned.is_empty() {
@@ -104,11 +104,11 @@ fn fault(path: &Path, what: impl Into<String>, remedy: &'static str) -> Error {
     Error::recording(path, what, remedy)
 }
 
-/// Put the shards in these folders together in `output`, ready for the trial to go on. What was
-/// ordered, and the limit of one diagnosis, s.
+/// Merges the shards in these folders into `output`, ready for the trial to resume. Returns the order and
+/// the limit of one diagnosis, s.
 ///
 /// # Errors
-/// When a shard is missing, there twice, unfinished, changed since, or of another trial or build.
+/// When a shard is missing, given twice, unfinished, changed since, or of another trial or build.
 pub fn gather(folders: &[PathBuf], program: &Path, output: &Path) -> Result<(Order, u64)> {
     let mut shards: BTreeMap<usize, (&PathBuf, Finished)> = BTreeMap::new();
     for folder in folders {
@@ -196,8 +196,8 @@ fn same_trial(folder: &Path, shard: &Finished, first: &Finished) -> Result<()> {
     Err(fault(folder, differs, "give the shards of one trial, all held alike"))
 }
 
-/// The published files are those that the shard wrote, and hold what is to be merged: every set of
-/// its part, each with the verdict that was hashed.
+/// Checks that the published files are those that the shard wrote, and that what is to be merged matches
+/// them: every set of its part, each with the verdict that was hashed.
 fn check(folder: &Path, finished: &Finished) -> Result<()> {
     const REMEDY: &str = "hold this shard again, in a new folder";
     let (commitments, c): (Commitments, _) = read_json(&folder.join("commitments.json"))?;

@@ -1,4 +1,4 @@
-//! A diagnosis by another process, which can reach one set and nothing else.
+//! Diagnosis in a separate process that can reach one set and nothing else.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -13,39 +13,39 @@ use kinoise::{Error, NoiseModel, Recording};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// The hidden subcommand that shuts itself in and diagnoses.
+/// Hidden subcommand that confines itself and diagnoses.
 const SUBCOMMAND: &str = "solve";
-/// What the solver calls its set and its answer, seen from the folder it is started in.
+/// The solver's set and output folders, relative to its working directory.
 const DATA: [&str; 2] = [".", "../out"];
 /// Exit code of a mismatch, as of `kinoise diagnose`.
 const MISMATCH: u8 = 1;
 
-/// What was said to one set.
+/// The diagnosis of one set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// The diagnosis without its curves; they are in `diagnoses/`.
     pub verdict: Option<Value>,
-    /// Why there is none.
+    /// Why there is no verdict.
     pub failure: Option<String>,
     pub diagnosis_sha256: Option<String>,
 }
 
-/// An answer, and how it came about.
+/// An answer and how it was obtained.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Solved {
     #[serde(flatten)]
     pub answer: Answer,
-    /// Of its `model.json`, every byte.
+    /// SHA-256 of its `model.json`.
     #[serde(default)]
     pub model_sha256: Option<String>,
-    /// What kept the process from the rest of the machine.
+    /// What confined the process.
     pub confinement: String,
-    /// Depends on the machine.
+    /// Duration; depends on the machine.
     pub seconds: f64,
 }
 
 impl Answer {
-    /// Of the bytes of a `diagnosis.json`, or of why there are none.
+    /// Answer from the bytes of a `diagnosis.json`, or from the reason why there are none.
     pub fn of(diagnosis: std::result::Result<Vec<u8>, String>) -> Self {
         let read = diagnosis.and_then(|bytes| {
             let verdict = serde_json::from_slice(&bytes).map_err(|e| e.to_string())?;
@@ -60,8 +60,8 @@ impl Answer {
     }
 }
 
-/// Diagnose the set in `scratch/set` by a process of `program`; the answer goes to `scratch/out`.
-/// A diagnosis that fails is an answer too.
+/// Diagnoses the set in `scratch/set` in a process of `program`, which writes to `scratch/out`. A failed
+/// diagnosis is an answer too.
 pub fn solve(program: &Path, limit: Duration, scratch: &Path) -> Result<Solved> {
     let out = scratch.join("out");
     fs::create_dir_all(&out).map_err(|e| Error::write(&out, e))?;
@@ -81,7 +81,7 @@ pub fn solve(program: &Path, limit: Duration, scratch: &Path) -> Result<Solved> 
     Ok(Solved { answer, model_sha256, confinement, seconds })
 }
 
-/// `None` when it had to be ended.
+/// Runs the solver; `None` if it exceeded the limit and was killed.
 fn run(program: &Path, limit: Duration, scratch: &Path) -> Result<Option<ExitStatus>> {
     let to = |name: &str| -> Result<File> {
         let path = scratch.join(name);
@@ -108,7 +108,7 @@ fn run(program: &Path, limit: Duration, scratch: &Path) -> Result<Option<ExitSta
     Ok(None)
 }
 
-/// What is for drawing stays in the complete diagnosis.
+/// Drops what serves only for drawing; the complete diagnosis keeps it.
 fn without_curves(mut diagnosis: Value) -> Value {
     if let Some(findings) = diagnosis.get_mut("findings").and_then(Value::as_array_mut) {
         for finding in findings.iter_mut().filter_map(Value::as_object_mut) {
@@ -121,10 +121,10 @@ fn without_curves(mut diagnosis: Value) -> Value {
     diagnosis
 }
 
-/// The solver's side: shut in, then what `kinoise diagnose` does.
+/// Solver process: confines itself, then does what `kinoise diagnose` does.
 pub fn diagnose_shut_in() -> anyhow::Result<u8> {
     let [set, out] = DATA.map(Path::new);
-    // Before any thread is started: threads that run already would stay free.
+    // Before any thread is started: threads that already run would stay unconfined.
     println!("{}", confine(set, out));
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let recording = open(&set.join("recording"), &Assumed::default())?;
@@ -147,8 +147,8 @@ pub fn diagnose_shut_in() -> anyhow::Result<u8> {
     Ok(if done.diagnosis.verdict == Verdict::Mismatch { MISMATCH } else { 0 })
 }
 
-/// Shut this process out of everything but reading below `read` and writing below `write`; no
-/// network. Says what is in force, and only what a trial at the door confirms.
+/// Confines this process to reading below `read` and writing below `write`, without network. Returns what is
+/// in force, and only what a test confirms.
 #[cfg(target_os = "linux")]
 fn confine(read: &Path, write: &Path) -> String {
     use landlock::{
@@ -158,7 +158,7 @@ fn confine(read: &Path, write: &Path) -> String {
     let restrict = || -> std::result::Result<_, RulesetError> {
         let all = AccessFs::from_all(ABI::V5);
         Ruleset::default()
-            // What an older kernel lacks is left out; the status says so.
+            // Restrictions that an older kernel lacks are left out; the status says so.
             .set_compatibility(CompatLevel::BestEffort)
             .handle_access(all)?
             .handle_access(AccessNet::from_all(ABI::V4))?
@@ -168,7 +168,7 @@ fn confine(read: &Path, write: &Path) -> String {
             .add_rules(path_beneath_rules([write], all))?
             .restrict_self()
     };
-    // The root folder can be listed on every Linux, except from inside.
+    // An unconfined process can list the root folder on every Linux.
     let shut = || fs::read_dir("/").is_err();
     match restrict().map(|status| status.landlock) {
         Ok(LandlockStatus::Available { effective_abi, .. }) if shut() => {

@@ -1,5 +1,5 @@
-//! The ceremony from the commitments to the check, with a solver that always says "match": what is
-//! tampered with is noticed, whichever file it is in; and the same in shards.
+//! Trials from the commitments to the check, with a solver that always says "match": tampering with any file
+//! is noticed; and the same in shards.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -18,7 +18,7 @@ use crate::trial::{Trial, hold};
 
 const SETS: usize = 3;
 
-/// Of a trial that is quick: small ray-traced pictures.
+/// Order of a quick trial: small ray-traced images.
 fn order() -> Order {
     let quick =
         |order: &Order| plan(order).iter().all(|p| p.asked.small && p.asked.world == World::Rays);
@@ -26,7 +26,7 @@ fn order() -> Order {
     orders.find(quick).expect("a seed with small sets")
 }
 
-/// A program that answers every set alike.
+/// A program that gives every set the same answer.
 fn solver(folder: &Path, verdict: &str) -> PathBuf {
     let path = folder.join("solver.sh");
     let answer = json!({"verdict": verdict, "findings": []});
@@ -108,7 +108,7 @@ fn an_interrupted_trial_goes_on_and_another_program_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let program = solver(folder.path(), "match");
     let whole = hold(&trial(folder.path(), program.clone()), &|_, _, _| ()).expect("a trial");
-    // As after an interruption before the verdicts were closed.
+    // State after an interruption before the verdicts were published.
     let out = folder.path().join("out");
     for file in ["proof.json", "summary.json", "verdicts.json", "verdicts-advised.json"] {
         fs::remove_file(out.join(file)).expect("removed");
@@ -123,7 +123,7 @@ fn an_interrupted_trial_goes_on_and_another_program_is_refused() {
     assert!(told.to_string().contains("another build"), "{told}");
 }
 
-/// A solver that asks for a view more of every set, so that there is a second round.
+/// A solver that asks for another view of every set, so that there is a second round.
 fn doubting(folder: &Path) -> PathBuf {
     let path = folder.join("doubting.sh");
     let view = json!({"z_m": 1.2, "theta_rad": 0.4, "azimuth_rad": 0.0});
@@ -138,7 +138,7 @@ fn doubting(folder: &Path) -> PathBuf {
     path
 }
 
-/// Every file of a finished trial but for the seconds, which depend on the machine.
+/// All files of a finished trial, without the seconds, which depend on the machine.
 fn published(folder: &Path) -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_path_buf()];

@@ -1,5 +1,5 @@
-//! The trial: make the sets and commit to them, diagnose them, publish the verdicts, take the views
-//! that were advised and diagnose again, and only then open the answers.
+//! The trial: makes the sets and commits to them, diagnoses them, publishes the verdicts, takes the advised
+//! views and diagnoses again, and only then opens the answers.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,21 +14,21 @@ use crate::plan::plan;
 use crate::proof::{Advised, FORMAT, Order, PROOF, Proof, ProvenSet, SUMMARY};
 use crate::rounds::{Progress, Round, refused, remove, take, take_advised};
 
-/// What is wanted.
+/// Options of a trial.
 pub struct Trial {
     pub output: PathBuf,
     pub order: Order,
-    /// Real recordings.
+    /// Folder of real recordings.
     pub data: Option<PathBuf>,
     /// Keep every set and all that the solver wrote.
     pub keep: bool,
     /// The program that diagnoses.
     pub program: PathBuf,
-    /// Of one diagnosis.
+    /// Time limit of one diagnosis.
     pub limit: Duration,
 }
 
-/// Hold the trial, or go on with one that was interrupted.
+/// Runs the trial, or resumes one that was interrupted.
 pub fn hold(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
     let out = &trial.output;
     std::fs::create_dir_all(out).map_err(|e| kinoise::Error::write(out, e))?;
@@ -42,7 +42,7 @@ pub fn hold(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
     let verdicts = one.solved.iter().map(|s| s.answer.verdict.as_ref());
     let again = take_advised(&sets, verdicts, progress)?;
     let two = Round { index: 1, ..first }.run(&again, Some(&one.published[1]))?;
-    // The answers are opened.
+    // From here on the answers are open.
     let gains = first.examine_all(&sets, &one.commitments)?;
     let mut confinement = BTreeMap::new();
     for solved in one.solved.iter().chain(&two.solved) {
@@ -76,7 +76,7 @@ pub fn hold(trial: &Trial, progress: Progress<'_>) -> Result<Proof> {
         confinement,
         sets: proven,
     };
-    // A row a set makes many lines: on one, they are half as many bytes to keep.
+    // On one line: pretty-printed, the rows would take twice the bytes.
     write_atomic(&out.join(SUMMARY), format!("{}\n", proof.summary()).as_bytes())?;
     write_json(&out.join(PROOF), &proof)?;
     remove(&out.join("work"))?;

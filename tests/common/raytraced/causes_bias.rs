@@ -1,5 +1,4 @@
-//! The catalogue's causes of error in the mean, of the match, of what is looked at and of what the
-//! driver makes of it.
+//! The catalogue's causes of bias: in the match, in the target and in the driver.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
@@ -15,7 +14,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
     let Draw { strength: s, unit, .. } = *of;
     let px = unit.scale();
     Some(match name {
-        // Matches come in steps, counted from a reference that is no whole number of them.
+        // Matches come in steps, counted from a reference that is not a whole number of them.
         "disparity-quantisation" => {
             let step = 0.125 * s * px;
             let act = Act::Lattice { step, phase: rng.random_range(0.0..1.0) };
@@ -31,7 +30,8 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
             let cause = Cause::new(name, "floor", at, &[("step_m", step)], Act::Floor(step));
             Cause { worth: Worth::Never, ..cause }
         }
-        // Leans toward whole pixels: half-way between them the error is greatest, or jumps.
+        // Pulls matches towards whole pixels; half-way between them the sawtooth jumps and the
+        // others are zero.
         "pixel-locking" => {
             let a = 0.05 * s * px;
             let form = lot(&["sawtooth", "triangle", "cubic"], rng);
@@ -46,7 +46,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
                 }
             })
         }
-        // The firmware takes a ramp over the columns away in whole steps of the read-out.
+        // The firmware removes a ramp over the columns in whole steps of the read-out.
         "column-banding" => {
             let step = 0.125 * s * px;
             let period = px * rng.random_range(40.0..200.0);
@@ -58,7 +58,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
                 (ramp / step).round() * step - ramp
             })
         }
-        // A bowl of disparity about the principal point, 0 in the middle, `k` at the corner.
+        // A bowl in disparity about the principal point, 0 in the centre, `k` at the corner.
         "radial-disparity-bias" => {
             let k = sign(rng) * 0.25 * s * px;
             let form = lot(&["1 - cos", "r^2 and r^4", "gaussian well"], rng);
@@ -81,7 +81,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
             let at = ["bias", "radius"];
             Cause::new(name, "division model", at, &[("k1", lambda)], Act::Ray(Box::new(bend)))
         }
-        // The ray's length, or what a driver with a wrong focal length makes of it.
+        // Range along the ray instead of depth, or partly converted, as with a wrong focal length.
         "range-not-depth" => {
             let share = s.powf(1.5).min(1.0);
             let form = if share < 1.0 { "half undone" } else { "ray length" };
@@ -99,17 +99,17 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
             let act = Act::Gain(Box::new(move |_, _| scale));
             Cause::new(name, "wrong baseline", ["bias", "z"], &[("scale", scale)], act)
         }
-        // The reference plane stands elsewhere than the driver believes.
+        // The reference plane is not where the driver believes it is.
         "disparity-offset" => {
             let reference_m = rng.random_range(1.2..2.5);
             let offset = sign(rng) * 0.1 * s * px;
-            // By how much the reference plane is off to shift the pattern that far.
+            // Displacement of the reference plane that shifts the pattern by `offset`.
             let off_m = offset * reference_m * reference_m / unit.disparity_px_m();
             let wrong = unit.disparity_px_m() * (1.0 / reference_m - 1.0 / (reference_m + off_m));
             let form = "reference plane misplaced";
             bias(name, form, "z", &[("offset_px", wrong)], move |_, _| wrong)
         }
-        // Warm-up, its approach not exponential.
+        // Warm-up that does not settle exponentially.
         "thermal-drift" => {
             let relative = sign(rng) * 0.004 * s;
             let tau_s = rng.random_range(500.0..1200.0);
@@ -124,7 +124,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
             Cause::new(name, form, ["bias", "session-time"], &parameters, act)
         }
         "target-bow" => target_bow(name, of, rng),
-        // The board slides along its normal, and is slowed or hurried.
+        // The board moves along its normal and accelerates or slows down.
         "target-motion" => {
             let velocity = sign(rng) * 0.005 * s;
             // Over the few tenths of a second of a view.
@@ -134,7 +134,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
             let parameters = [("velocity_mps", velocity)];
             Cause::new(name, "accelerated", ["bias", "frame"], &parameters, act)
         }
-        // Every pixel's own constant: uniform, not Gaussian.
+        // A constant of each pixel: a sum of uniforms, not Gaussian.
         "fixed-pattern-noise" => {
             let sigma = 0.05 * s * px;
             let mut rng = of.seed.stream("rays/fixed pattern");
@@ -145,8 +145,8 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
             })
             .worth(move |ground| ground.of_pixels(sigma))
         }
-        // A footprint with soft edges sees two surfaces: their disparities mix by the share of each.
-        // Below strength 1 only a part of the light is spread so.
+        // A footprint with soft edges sees two surfaces and mixes their disparities by area. Below
+        // strength 1 only part of the light is spread so.
         "edge-mixing" => {
             let (width, part) = (2.0 * s.max(1.0) * px.max(0.5), s.min(1.0));
             let form = "gaussian footprint, mixed in disparity";
@@ -161,7 +161,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
     })
 }
 
-/// A bent board, `half` m from its middle to its end.
+/// A bent board, `half` m from its centre to its end.
 fn target_bow(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
     let half = of.half_m;
     let sagitta = sign(rng) * 0.004 * of.strength;

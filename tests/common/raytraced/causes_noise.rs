@@ -1,5 +1,5 @@
-//! The catalogue's causes in how noisy a pixel is, how its noise hangs together and how far it
-//! strays, and of pixels without an answer.
+//! The catalogue's causes of noise: its size, its correlation and its tails; and of pixels
+//! without an answer.
 
 use std::f64::consts::{FRAC_PI_2, LN_2, SQRT_2, TAU};
 
@@ -13,9 +13,9 @@ use super::worth::{of_average, of_frozen, of_strays, of_student, of_window};
 use super::{Act, Cause, Clock, Draw, Phase, loss, spread};
 use kinoise::rng::Stream;
 
-/// Light of an office, lx.
+/// Illuminance of an office, lx.
 const OFFICE_LUX: f64 = 500.0;
-/// Share of light that white paper gives back.
+/// Reflectance of white paper.
 const WHITE: f64 = 0.8;
 
 /// The cause of this name; `None` when it is none of these.
@@ -31,12 +31,12 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
     })
 }
 
-/// Some pixels are noisier than sigma(z, theta) says.
+/// Causes that make some pixels noisier than sigma(z, theta) says.
 fn noisier(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
     let Draw { strength, unit, .. } = *of;
     let growth = 0.5 * strength;
     Some(match name {
-        // Far away it grows faster.
+        // Grows faster at long range.
         "range-exponent" => {
             let form = lot(&["softplus", "z^4 in quadrature"], rng);
             spread(name, form, "z", &[("growth", growth)], move |s, _| match form {
@@ -44,13 +44,13 @@ fn noisier(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
                 _ => (1.0 + 0.5 * strength * (s.z / 2.5).powi(4)).sqrt(),
             })
         }
-        // The pixel trembles over the slope, ray by ray.
+        // The ray jitters over the slope, pixel by pixel.
         "slope-noise" => {
             let lateral = 0.8 * strength * unit.scale();
             let (at, parameters) = (["variance", "theta"], [("sigma_lateral_px", lateral)]);
             Cause::new(name, "trembling rays", at, &parameters, Act::Wander(lateral))
         }
-        // The gradient of disparity stretches the window along the baseline and calms it across.
+        // The disparity gradient stretches the window: noisier along the baseline, calmer across it.
         "tilt-axis-anisotropy" => {
             let parameters = [("ratio", 1.0 + growth)];
             let steep2 = 3.0; // tan^2 of 60 degrees
@@ -73,14 +73,14 @@ fn noisier(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
                 _ => 1.0 + growth * (0.3 * s.radius.powi(2) + 0.7 * s.radius.powi(4)),
             })
         }
-        // Shot noise and a floor: only a part of the variance goes with one over the print's grey.
+        // Shot noise over a floor: only part of the variance goes as one over the print's albedo.
         "intensity-dependent-noise" => {
             let form = "shot noise over a floor";
             spread(name, form, "intensity", &[("share", growth)], move |s, _| {
                 (1.0 + growth * (WHITE / s.albedo - 1.0)).sqrt()
             })
         }
-        // Background light against the pattern's, which falls with distance and slant.
+        // Background light relative to the pattern's, which falls with distance and slant.
         "ambient-light" => {
             let ratio = 0.05 * strength;
             let power = rng.random_range(0.4..0.6);
@@ -126,8 +126,8 @@ fn heavy_tails(name: &str, strength: f64, rng: &mut Stream) -> Cause {
         .worth(move |ground| ground.views(|look| look.frames()) * of_strays(fraction, scale))
 }
 
-/// Neighbours share a window that is not a flat one; below strength 1 they share it for a part of
-/// the noise only, and the read-out adds the rest.
+/// Neighbours share a window that is not flat. Below strength 1 only part of the noise goes through it; the
+/// read-out adds the rest.
 fn spatial_correlation(strength: f64, rng: &mut Stream) -> Cause {
     let side = 7.0 * strength.max(1.0);
     let bell = lot(&[true, false], rng);
@@ -135,7 +135,7 @@ fn spatial_correlation(strength: f64, rng: &mut Stream) -> Cause {
     windowed(if bell { "gaussian window" } else { "triangular window" }, window, strength)
 }
 
-/// `share` of the variance is seen through `window`, the rest is each pixel's own.
+/// `share` of the variance goes through `window`, the rest is independent in each pixel.
 pub fn windowed(form: &str, window: Window, share: f64) -> Cause {
     let share = share.min(1.0);
     let mut parameters = vec![("length_px", window.side())];
@@ -159,7 +159,7 @@ pub fn windowed(form: &str, window: Window, share: f64) -> Cause {
         .worth(move |ground| ground.views(|look| look.frames() * of_window(&told, share)))
 }
 
-/// A moving average over two frames, the earlier the weaker; beyond strength 1 over three.
+/// A moving average over two frames, with the earlier one weaker; beyond strength 1 over three.
 fn temporal_correlation(name: &str, strength: f64) -> Cause {
     let weights = if strength <= 1.0 {
         vec![1.0, strength]
@@ -188,7 +188,7 @@ fn temporal_correlation(name: &str, strength: f64) -> Cause {
     )
 }
 
-/// Grain that stands still within a view: a sum of uniforms.
+/// Noise that is fixed within a view: a sum of uniforms.
 fn frozen_noise(name: &str, strength: f64) -> Cause {
     let fraction = strength / (strength + 0.5);
     let (still, alive) = (fraction.sqrt() as f32, (1.0 - fraction).sqrt() as f32);
@@ -204,7 +204,7 @@ fn frozen_noise(name: &str, strength: f64) -> Cause {
     })
 }
 
-/// Each row's own uniform shift; or the mount swings: a sine met at a random phase in every view.
+/// A uniform shift of each row; or a swinging mount: a sine with a random phase in every view.
 fn shaking(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
     let sigma = 0.03 * of.strength * of.unit.scale();
     if name == "row-noise" {
@@ -228,8 +228,8 @@ fn shaking(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
         .worth(move |ground| ground.of_frames(sigma))
 }
 
-/// Pixels without an answer: beyond an angle, beyond a distance or short of one, or where the board
-/// stands in the projector's light.
+/// Pixels without an answer: beyond an angle, beyond or short of a distance, or where the board blocks the
+/// projector's light.
 fn missing(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
     let forms = ["normal cdf", "gompertz"];
     match name {
@@ -263,7 +263,7 @@ fn missing(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Cause {
     }
 }
 
-/// Rises from 0 to 1, one half at 0.
+/// Rises from 0 to 1 and is 0.5 at 0.
 fn rise(form: &str, t: f64) -> f64 {
     match form {
         "normal cdf" => 0.5 * erfc(-t / SQRT_2),

@@ -1,4 +1,4 @@
-//! What an order leaves open, by lot; what each effect needs of a session; each effect by name.
+//! Random choices where an order leaves them open; what each effect needs of a session; effects by name.
 
 use rand::Rng;
 use rand::seq::IndexedRandom;
@@ -46,10 +46,10 @@ pub const CATALOGUE: [&str; 29] = [
 
 const EDGED: [&str; 2] = ["edge-mixing", "occlusion-shadow"];
 
-/// What only reference distances show.
+/// Effects that only reference distances show.
 const BLIND: [&str; 3] = ["depth-scale", "disparity-offset", "thermal-drift"];
 
-/// One of each kind for pairs that do not hide one another.
+/// Groups for pairs and triples: effects of different groups do not hide one another.
 const PAIRED: [&[&str]; 5] = [
     &["pixel-locking", "column-banding", "radial-disparity-bias", "lens-distortion"],
     &["range-exponent", "slope-noise", "vignetting", "tilt-axis-anisotropy"],
@@ -58,7 +58,7 @@ const PAIRED: [&[&str]; 5] = [
     &["grazing-dropout", "range-dropout"],
 ];
 
-/// Pairs of which one looks like the other until their axes are told apart.
+/// Pairs that look alike until their axes are told apart.
 const MIMICS: [[&str; 2]; 9] = [
     ["radial-disparity-bias", "lens-distortion"],
     ["radial-disparity-bias", "target-bow"],
@@ -71,8 +71,7 @@ const MIMICS: [[&str; 2]; 9] = [
     ["grazing-dropout", "range-dropout"],
 ];
 
-/// What can be confined to some views or far distances, to a region, or to late times, and still
-/// show there.
+/// Effects that still show when confined to some views or far distances, to a region, or to late times.
 const BY_VIEW: [&str; 5] = [
     "pixel-locking",
     "column-banding",
@@ -154,7 +153,7 @@ pub fn session(order: &Order, names: &[String], rng: &mut Stream) -> Session {
     }
 }
 
-/// Correlation that the model knows of.
+/// Noise correlation that the model knows of, if any.
 pub fn window(order: &Order, names: &[String], rng: &mut Stream) -> Option<Cause> {
     let own = any(names, &["spatial-correlation", "slope-noise", "heavy-tails"]);
     let chance = if order.cell == Cell::Null { 0.5 } else { 0.2 };
@@ -172,7 +171,7 @@ pub fn window(order: &Order, names: &[String], rng: &mut Stream) -> Option<Cause
     Some(causes_noise::windowed(form, window, 1.0))
 }
 
-/// The unit is no longer what its model says.
+/// Changes the unit's sigma, so that it is no longer what its model says.
 pub fn age(unit: &mut Unit, strength: f64, rng: &mut Stream) {
     let change = 0.25 * strength;
     let factor = if rng.random::<bool>() { 1.0 + change } else { 1.0 / (1.0 + change) };
@@ -180,7 +179,7 @@ pub fn age(unit: &mut Unit, strength: f64, rng: &mut Stream) {
     unit.sigma[0] *= factor.powf(rng.random_range(-0.5..1.0));
 }
 
-/// The cause of this name. What is drawn of `rng` does not depend on the strength.
+/// The cause of this name. What is drawn from `rng` does not depend on the strength.
 pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Result<Cause> {
     causes_bias::cause(name, of, rng)
         .or_else(|| causes_noise::cause(name, of, rng))

@@ -1,4 +1,4 @@
-//! A cause that acts only here, or only then.
+//! Causes that act in some views, one region, far away or late only.
 
 use std::sync::Arc;
 
@@ -22,17 +22,17 @@ pub enum Gate {
     Rows([f64; 2]),
     /// Beyond this depth, m.
     Far(f64),
-    /// From then on, s of the session, to its end.
+    /// From the first of these session times to the session's end, s.
     Late([f64; 2]),
 }
 
-/// No set reaches farther, m.
+/// Beyond the reach of any set, m.
 const FARTHEST_M: f64 = 10.0;
 
 impl Gate {
-    /// By lot, so that several views lie on either side; `None` where the cell confines nothing.
+    /// Draws a gate that leaves several views on either side; `None` where the cell confines nothing.
     pub fn draw(cell: Cell, plans: &[Plan], unit: &Unit, rng: &mut Stream) -> Option<Self> {
-        // Between two views, as long as there are views enough.
+        // Midway between two views, as long as there are enough views.
         let mut between = |of: &dyn Fn(&Plan) -> f64| {
             let mut at: Vec<f64> = plans.iter().map(of).collect();
             at.sort_by(f64::total_cmp);
@@ -86,7 +86,6 @@ impl Gate {
         }
     }
 
-    /// `cause`, confined.
     pub fn confine(&self, cause: Cause) -> Result<Cause> {
         let Cause { mut label, act, worth, window } = cause;
         let here = Arc::new(self.clone());

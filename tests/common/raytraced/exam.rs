@@ -1,4 +1,4 @@
-//! Views that the solver never gets, without noise: what a unit reports, and how noisy it would be.
+//! Views that the solver never gets, without noise: what a unit reports, and its standard deviation.
 
 use rand::Rng;
 
@@ -11,17 +11,18 @@ use kinoise::correct::Conditions;
 use kinoise::rng::Stream;
 use kinoise::stats::range;
 
-/// Views among those of the recording.
+/// Number of views within the recording's distances and tilts.
 const WITHIN: usize = 6;
-/// Farther by up to this factor than the farthest, steeper by up to so much than the steepest.
+/// Views beyond the recording: up to this factor farther than its farthest, up to this much steeper than
+/// its steepest.
 const FARTHER: f64 = 1.3;
 const STEEPER_RAD: f64 = 10.0 / 180.0 * std::f64::consts::PI;
 /// No board can be seen at a steeper angle, rad.
 const STEEPEST_RAD: f64 = 1.3;
-/// Of no view of the recording.
+/// Index that no view of the recording has.
 const NO_VIEW: usize = usize::MAX;
 
-/// Fresh views: some within the distances and tilts of the recording, some beyond.
+/// Fresh views: some within the recording's distances and tilts, some beyond.
 pub fn views(set: &Set) -> Vec<ExamView> {
     let mut rng = set.seed.stream("rays/exam");
     let end = |of: fn(&Plan) -> f64| set.plans.iter().map(of).fold(0.0, f64::max);
@@ -34,7 +35,7 @@ pub fn views(set: &Set) -> Vec<ExamView> {
     for k in 0..WITHIN {
         let near = (k as f64 + rng.random::<f64>()) / WITHIN as f64;
         let z = range.z[0] * (range.z[1] / range.z[0]).powf(near);
-        // A view out of three from the next, so that tilt does not go with distance.
+        // Permuted, so that tilt does not go with distance.
         let tilt = ((5 * k % WITHIN) as f64 + rng.random::<f64>()) / WITHIN as f64;
         poses.push((false, z, range.theta * tilt));
     }
@@ -46,7 +47,7 @@ pub fn views(set: &Set) -> Vec<ExamView> {
     poses.into_iter().map(|pose| view(set, &range, pose, &mut rng)).collect()
 }
 
-/// Of the recording.
+/// Ranges of the recording.
 struct Range {
     z: [f64; 2],
     theta: f64,
@@ -81,7 +82,7 @@ fn seen(world: World<'_>, plan: &Plan) -> (Vec<f32>, Vec<f32>) {
     for cause in world.causes {
         match cause.act {
             Act::Wander(px) => tremble = tremble.hypot(px),
-            // Cut off, a depth is half a step short on average.
+            // Truncated, a depth is half a step short on average.
             Act::Floor(step) => cut += 0.5 * step,
             _ => {}
         }

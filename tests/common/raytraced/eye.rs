@@ -1,4 +1,4 @@
-//! A pixel looks, through the lens, at the board or past it.
+//! What a pixel sees through the lens: the board, or what lies behind it.
 
 use nalgebra::Vector3;
 
@@ -8,7 +8,7 @@ use super::{Act, Cause, Unit};
 
 /// Nothing answers from farther away, m.
 const FARTHEST_M: f64 = 12.0;
-/// Of a wall behind the board.
+/// Albedo of a wall behind the board.
 const WALL_ALBEDO: f64 = 0.6;
 
 /// A pixel, and what it looks at.
@@ -18,7 +18,7 @@ pub struct Site {
     pub v: f64,
     /// Distance from the principal point over that of the farthest corner.
     pub radius: f64,
-    /// Of the ray as the camera's description has it.
+    /// The ray (x, y, 1) by the camera's description.
     pub x: f64,
     pub y: f64,
     /// Depth along the optical axis, m.
@@ -27,28 +27,28 @@ pub struct Site {
     pub disparity: f64,
     pub point: Vector3<f64>,
     pub on_board: bool,
-    /// On the board, m from its centre.
+    /// Position on the board, m from its centre.
     pub place: [f64; 2],
-    /// Tilt of what is met, rad.
+    /// Tilt of the surface, rad.
     pub theta: f64,
     /// Cosine of the angle between ray and normal.
     pub facing: f64,
-    /// Into the picture from the nearest outline of the board, px; positive on the board.
+    /// Distance to the board's outline in the image, px; positive on the board.
     pub edge_px: f64,
-    /// Of the other surface at this pixel, px.
+    /// Disparity of the other surface at this pixel, px.
     pub other_disparity: Option<f64>,
-    /// Share of the light given back.
+    /// Share of the light that is reflected.
     pub albedo: f64,
 }
 
-/// A unit, and what acts on it.
+/// A unit and the causes that act on it.
 #[derive(Clone, Copy)]
 pub struct World<'a> {
     pub unit: &'a Unit,
     pub causes: &'a [Cause],
-    /// Patches of grey are printed on the board.
+    /// Whether grey patches are printed on the board.
     pub printed: bool,
-    /// Some cause asks how far the board's edge is.
+    /// Whether some cause needs the distance to the board's edge.
     pub edged: bool,
 }
 
@@ -58,7 +58,7 @@ pub struct Eye<'a> {
     pub world: World<'a>,
     pub plan: &'a Plan,
     corner_px: f64,
-    /// Of the board in the picture, when a cause asks for it.
+    /// Outline of the board in the image, if a cause needs it.
     outline: Option<[[f64; 2]; 4]>,
 }
 
@@ -71,7 +71,7 @@ impl<'a> Eye<'a> {
         Eye { world, plan, corner_px, outline: corners.and_then(|c| outline(world.unit, &c)) }
     }
 
-    /// The same view with these causes at work.
+    /// The same view with these causes.
     pub fn with<'b>(&self, causes: &'b [Cause]) -> Eye<'b>
     where
         'a: 'b,
@@ -100,7 +100,7 @@ impl<'a> Eye<'a> {
         let point = ray * z;
         let fb = self.world.unit.disparity_px_m();
         let normal = if on_board { stage.board.normal } else { Vector3::z() };
-        // Where the projector sees what the camera, believing in its own rays, sees here.
+        // Column at which the projector sees the point that the camera, by its described rays, sees here.
         let column = c.cx + c.fx * (x * z - self.world.unit.baseline_m) / z;
         Some(Site {
             u,
@@ -132,7 +132,7 @@ impl<'a> Eye<'a> {
         if !self.world.causes.iter().any(|c| matches!(c.act, Act::Lift(_))) {
             return flat;
         }
-        // A few millimetres of rise move the place by less: three rounds settle it.
+        // A few millimetres of rise move the position on the board by less: three iterations settle it.
         (0..3).fold(flat, |z, _| flat * (1.0 - lift(z) / board.reach))
     }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Coefficients of the columns of weighted rows (columns, value, 1 over its variance); `None` where
-/// the rows do not determine them.
+/// Weighted least squares of rows (columns, value, 1 over its variance): coefficients of the columns; `None`
+/// where the rows do not determine them.
 pub fn least_squares(rows: impl Iterator<Item = (Vector3<f64>, f64, f64)>) -> Option<Vector3<f64>> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for (x, value, weight) in rows {
@@ -13,10 +13,10 @@ pub fn least_squares(rows: impl Iterator<Item = (Vector3<f64>, f64, f64)>) -> Op
     normal.cholesky().map(|c| c.solve(&right))
 }
 
-/// A flat board; endless where it has no size.
+/// A flat board; infinite where it has no size.
 #[derive(Debug, Clone)]
 pub struct Board {
-    /// Where its own coordinates begin, m.
+    /// Origin of its own coordinates, m.
     pub centre: Vector3<f64>,
     pub right: Vector3<f64>,
     pub down: Vector3<f64>,
@@ -29,8 +29,9 @@ pub struct Board {
 }
 
 impl Board {
-    /// Met by the optical axis at `z`, m, leaning so that depth grows towards `azimuth` by the tangent of
-    /// `theta`; `aim` is the place on the board, m, where the axis meets it; `roll` about its normal, rad.
+    /// Board met by the optical axis at depth `z`, m, and tilted by `theta` so that depth grows towards
+    /// `azimuth`. `aim` is the position on the board, m, where the axis meets it; `roll` is about its
+    /// normal, rad.
     pub fn posed(z: f64, [theta, azimuth]: [f64; 2], aim: [f64; 2], roll: f64) -> Self {
         let uphill =
             Vector3::new(azimuth.cos() * theta.cos(), azimuth.sin() * theta.cos(), theta.sin());
@@ -59,7 +60,7 @@ impl Board {
         self.half.is_none_or(|[a, b]| p.abs() <= a && q.abs() <= b)
     }
 
-    /// Corners, `inset` m within its edge, in order around it.
+    /// Corners, `inset` m inside its edge, in order around it.
     pub fn corners(&self, inset: f64) -> Option<[Vector3<f64>; 4]> {
         let [a, b] = self.half?.map(|h| h - inset);
         let corner = |(s, t): (f64, f64)| self.centre + self.right * (s * a) + self.down * (t * b);
@@ -73,7 +74,7 @@ pub struct Stage {
     pub board: Board,
     /// Depth of the wall, m.
     pub wall: Option<f64>,
-    /// Tilt of the board and where to, rad.
+    /// Tilt of the board and its azimuth, rad.
     pub theta: f64,
     pub azimuth: f64,
 }
@@ -100,7 +101,7 @@ fn outside_px(outline: &[[f64; 2]; 4], u: f64, v: f64) -> f64 {
     (0..4).map(to_side).fold(f64::INFINITY, f64::min)
 }
 
-/// Does the board stand between `point` and the projector?
+/// Whether the board stands between `point` and the projector.
 pub fn shaded(stage: &Stage, baseline_m: f64, point: &Vector3<f64>) -> bool {
     let lamp = Vector3::new(baseline_m, 0.0, 0.0);
     let normal = stage.board.normal;

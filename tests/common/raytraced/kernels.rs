@@ -1,4 +1,4 @@
-//! Random numbers, and windows that make neighbours err together.
+//! Random numbers, and windows that correlate the noise of neighbours.
 
 use rand::Rng;
 use rand::seq::SliceRandom;
@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::Clock;
 use kinoise::rng::{Seed, Stream};
 
-/// One of `forms`, by lot.
+/// One of `forms` at random.
 pub fn lot<T: Copy>(forms: &[T], rng: &mut Stream) -> T {
     forms[rng.random_range(0..forms.len())]
 }
@@ -16,12 +16,12 @@ pub fn sign(rng: &mut Stream) -> f64 {
     lot(&[-1.0, 1.0], rng)
 }
 
-/// The first 64 bits of a hash.
+/// Seed from the first 64 bits of a hash.
 pub fn seed_of(sha256: &str) -> Seed {
     Seed(sha256.get(..16).and_then(|bits| u64::from_str_radix(bits, 16).ok()).unwrap_or_default())
 }
 
-/// One number of each of `n` equal parts of 0 to 1, in no order.
+/// Stratified random numbers: one from each of `n` equal parts of 0 to 1, shuffled.
 pub fn scattered(n: usize, rng: &mut Stream) -> Vec<f64> {
     let mut places: Vec<f64> =
         (0..n).map(|i| (i as f64 + rng.random::<f64>()) / n as f64).collect();
@@ -45,7 +45,7 @@ pub fn roundish(rng: &mut Stream) -> f32 {
     (sum - 2.0) * 3f32.sqrt()
 }
 
-/// A separable window, its weights of unit square sum.
+/// A separable window with weights of unit square sum.
 #[derive(Debug, Clone)]
 pub struct Window {
     /// Odd in number.
@@ -59,28 +59,28 @@ impl Window {
         Window { taps: weights.iter().map(|w| (w / norm) as f32).collect() }
     }
 
-    /// All pixels alike, `side` px; a fraction falls to the two outermost.
+    /// Equal weights over `side` px; a fraction goes to the two outermost.
     pub fn flat(side: f64) -> Self {
         let reach = ((side - 1.0) / 2.0).ceil() as i32;
         let rim = (side - f64::from(2 * reach - 1)) / 2.0;
         Window::of((-reach..=reach).map(|k| if k.abs() == reach { rim } else { 1.0 }))
     }
 
-    /// A bell that reaches as far as a flat window of `side` px: 2 sqrt(pi) standard deviations.
+    /// Gaussian window with the [`Window::side`] of a flat one of `side` px: 2 sqrt(pi) standard deviations.
     pub fn bell(side: f64) -> Self {
         let sd = side / (2.0 * std::f64::consts::PI.sqrt());
         let reach = (4.0 * sd).ceil() as i32;
         Window::of((-reach..=reach).map(|k| (-0.5 * (f64::from(k) / sd).powi(2)).exp()))
     }
 
-    /// A tent that reaches as far as a flat window of `side` px: 4/3 of half its foot.
+    /// Triangular window with the [`Window::side`] of a flat one of `side` px: 3/4 of its base.
     pub fn tent(side: f64) -> Self {
         let half = side * 2.0 / 3.0;
         let reach = half.ceil() as i32;
         Window::of((-reach..=reach).map(|k| (1.0 - f64::from(k.abs()) / half).max(0.0)))
     }
 
-    /// Sum of the correlation over all lags along one axis: what the side of a flat window is.
+    /// Sum of the correlation over all lags along one axis: for a flat window, its side.
     pub fn side(&self) -> f64 {
         f64::from(self.taps.iter().sum::<f32>()).powi(2)
     }
@@ -100,7 +100,7 @@ impl Window {
         self.taps.iter().enumerate().map(wave).sum::<f64>().powi(2)
     }
 
-    /// Blur, the variance kept; the picture goes on at its other end.
+    /// Blurs with the variance kept and periodic boundaries.
     pub fn blur(&self, field: &mut [f32], width: usize) {
         let height = field.len() / width;
         let reach = self.taps.len() / 2;

@@ -1,9 +1,8 @@
-//! Concealed recordings by ray geometry: a ray meets the board, the projector sees the same point
-//! at another column, the matched column errs, and the depth is triangulated back.
+//! Concealed recordings by ray geometry: a ray meets the board, the projector sees the same point at another
+//! column, the matched column errs, and the depth is triangulated back.
 //!
-//! A cause acts in one place of that path ([`Act`]), says what it is ([`question::Hidden`]) and what
-//! knowing of it is worth ([`Worth`]). No formula is shared with the library's effects, simulators
-//! or diagnosis.
+//! A cause acts at one place of that path ([`Act`]), says what it is ([`question::Hidden`]) and what knowing
+//! it is worth ([`Worth`]). No formula is shared with the library's effects, simulators or diagnosis.
 
 mod causes_bias;
 mod causes_noise;
@@ -42,7 +41,7 @@ use nats::Ground;
 use poses::Plan;
 use question::Hidden;
 
-/// Which frame, for causes that are fresh in each.
+/// A frame, for causes that are drawn anew in each.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     pub seed: Seed,
@@ -55,13 +54,13 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// This frame's random numbers for one purpose.
+    /// Random numbers of this frame for one purpose.
     pub fn stream(&self, what: &str) -> Stream {
         self.seed.stream(&format!("rays/{what}/{}/{}", self.view, self.frame))
     }
 }
 
-/// The order in which noise of unit variance is shaped.
+/// Order in which noise of unit variance is shaped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
     InTime,
@@ -70,7 +69,7 @@ pub enum Phase {
     Tails,
 }
 
-/// Disparity that whole rows of one frame share, px.
+/// Disparity that each row of one frame adds, px.
 pub type Rows = [f32];
 
 type AtSite = Box<dyn Fn(&Site, &Plan) -> f64 + Send + Sync>;
@@ -82,55 +81,55 @@ type Shaker = Box<dyn Fn(&Clock, &mut Rows) + Send + Sync>;
 pub enum Act {
     /// The ray a pixel looks along instead of (x, y, 1).
     Ray(Box<dyn Fn(f64, f64) -> (f64, f64) + Send + Sync>),
-    /// Rise of the board towards the sensor at a place on it, m.
+    /// Height of the board towards the sensor at a position on it, m.
     Lift(Box<dyn Fn([f64; 2]) -> f64 + Send + Sync>),
-    /// How far along its normal the board has gone since the view's first frame, s to m.
+    /// Displacement of the board along its normal since the view's first frame, s to m.
     Move(Box<dyn Fn(f64) -> f64 + Send + Sync>),
     /// Error of the matched column, px of disparity.
     Mismatch(AtSite),
     /// Factor on sigma.
     Spread(AtSite),
-    /// Standard deviation of where a pixel looks, px.
+    /// Standard deviation of a pixel's viewing direction, px.
     Wander(f64),
     /// Shapes a frame's noise of unit variance.
     Grain(Phase, Reshape),
-    /// Adds to the error that a row's pixels share.
+    /// Adds to the error shared by a row's pixels.
     Shake(Shaker),
     /// Probability of no answer.
     Loss(AtSite),
-    /// Disparities that occur: `step` px apart, one of them at `phase` steps.
+    /// Disparities that occur: `step` px apart, with one at `phase` steps.
     Lattice { step: f64, phase: f64 },
     /// Factor on the stored depth.
     Gain(AtSite),
-    /// Depth is cut down to whole steps, m.
+    /// Truncates depth to whole steps, m.
     Floor(f64),
 }
 
-/// How the worth of knowing a cause is counted, nats.
+/// How the worth of knowing a cause is computed, nats.
 pub enum Worth {
-    /// From views without noise, with the cause and without it.
+    /// From noise-free views with and without the cause.
     Seen,
-    /// By a formula, for what shows in no mean and no spread.
+    /// By a formula, for causes that show in neither a mean nor a spread.
     Formula(Box<dyn Fn(&Ground<'_>) -> f64 + Send + Sync>),
-    /// At no strength is it weak: values that do not occur are seen or not seen, whatever the noise.
+    /// No strength makes it weak: values that do not occur are seen or not seen, whatever the noise.
     Never,
 }
 
-/// One thing that was left out of the model.
+/// One cause, known to the model or left out of it.
 pub struct Cause {
     pub label: Hidden,
     pub act: Act,
     worth: Worth,
-    /// What neighbours' noise is seen through, and the share of its variance that is.
+    /// Window that filters the noise, and the share of the variance that goes through it.
     window: Option<(Window, f64)>,
 }
 
-/// What a cause is drawn for.
+/// Context in which a cause is drawn.
 #[derive(Clone, Copy)]
 pub struct Draw<'a> {
     /// 1 is the middle of what real units show.
     pub strength: f64,
-    /// Share of a shadow that goes without an answer.
+    /// Share of a shadow's pixels that have no answer.
     pub shadow: f64,
     pub unit: &'a Unit,
     /// Half the board's width, m.
@@ -152,13 +151,13 @@ impl Cause {
         Cause { label, act, worth: Worth::Seen, window: None }
     }
 
-    /// It shows between these on its axis only.
+    /// Limits where it shows on its axis.
     fn within(mut self, low: f64, high: f64) -> Self {
         self.label.interval = Some([low, high]);
         self
     }
 
-    /// It shows on these axes as well.
+    /// Adds axes on which it shows as well.
     fn also(mut self, axes: &[&str]) -> Self {
         self.label.also = axes.iter().map(ToString::to_string).collect();
         self
@@ -169,7 +168,7 @@ impl Cause {
     }
 }
 
-/// Causes that act at every pixel by a function of its own.
+/// Causes that act at every pixel by a function of the site.
 macro_rules! at_sites {
     ($($(#[$doc:meta])* $name:ident: $statistic:literal, $act:path;)*) => {$(
         $(#[$doc])*
@@ -186,10 +185,10 @@ macro_rules! at_sites {
 }
 
 at_sites! {
-    /// On the mean error of the match.
+    /// Error of the matched disparity, px.
     bias: "bias", Act::Mismatch;
-    /// Noisier by a factor.
+    /// Factor on sigma.
     spread: "variance", Act::Spread;
-    /// Without an answer.
+    /// Probability of no answer.
     loss: "missing", Act::Loss;
 }

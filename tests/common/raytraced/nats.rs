@@ -1,16 +1,17 @@
-//! The expected gain of who knows the truth over the model, nats over the whole recording.
+//! Expected log-likelihood gain of an observer who knows the truth over the model, nats over the
+//! whole recording.
 //!
-//! Counted for one cause alone, from views without noise, after a plane a view is fitted. Noise that
-//! neighbours share counts as that of fewer pixels: n over the sum of its correlation for what shows
-//! in a mean, over the sum of its square for what shows in a variance or a product.
+//! Computed for one cause alone, from noise-free views, after fitting a plane to each view. Correlated noise
+//! counts as that of fewer pixels: n over the sum of its correlation for what shows in a mean, over the sum
+//! of its square for what shows in a variance or a product.
 //!
 //! | what acts | gain |
 //! |---|---|
-//! | error of the mean | frames 1/2 sum (d/sigma)^2, `d` in disparity less its own plane; with reference distances, what the plane took too |
-//! | moving board | the same frame by frame, less the view's mean |
+//! | mean error | frames 1/2 sum (d/sigma)^2, `d` less its plane; with references, the plane's part too |
+//! | moving board | the same frame by frame, minus the view's mean |
 //! | spread | 1/2 (r^2 - 1 - ln r^2), `r` the factor on sigma |
-//! | loss | Kullback-Leibler of the pixel's rate from the whole recording's, both over a floor of strays |
-//! | the rest | the cause's own formula, of [`super::worth`] |
+//! | loss | Kullback-Leibler of the pixel's rate from the recording's, both above a floor of strays |
+//! | the rest | the cause's own formula, see [`super::worth`] |
 
 use std::collections::BTreeMap;
 
@@ -23,37 +24,37 @@ use super::shoot::{Sum, slope};
 use super::worth::{of_effect, of_variance};
 use super::{Act, Cause, Set, Unit, Worth};
 
-/// Pixels that any sensor loses now and then: a loss is told apart from these.
+/// Rate of pixels that any sensor loses now and then; a loss must stand out from these.
 const STRAYS: f64 = 1e-3;
 
-/// A pixel that is looked at.
+/// A sampled pixel.
 pub struct Sample {
     pub site: Site,
-    /// Standard deviation of a frame's disparity with the known causes, px.
+    /// Standard deviation of one frame's disparity with the known causes, px.
     pub sigma_px: f64,
-    /// On the board, and where the recording says that the target is.
+    /// On the board, and inside the target's region by the recording's notes.
     pub on_target: bool,
 }
 
-/// One view, before anything is concealed.
+/// One view before anything is concealed.
 pub struct Looked<'a> {
     pub eye: Eye<'a>,
     pub samples: Vec<Sample>,
 }
 
-/// All views, and how much the noise of neighbours repeats.
+/// All views, and the correlation of their noise.
 pub struct Ground<'a> {
     pub unit: &'a Unit,
     pub views: Vec<Looked<'a>>,
-    /// Pixels that one sample stands for.
+    /// Number of pixels that one sample stands for.
     pub weight: f64,
     pub repeats: Repeats,
     /// Error of the reference distances, m.
     pub reference_m: Option<f64>,
 }
 
-/// Pixels that tell of a mean as much as one alone; along a row; and of a variance: sums of the
-/// noise's correlation over all lags.
+/// Pixels that count as one for a mean, for a mean along a row, and for a variance: sums of the noise's
+/// correlation (squared for a variance) over all lags.
 #[derive(Debug, Clone, Copy)]
 pub struct Repeats {
     pub area: f64,
@@ -110,7 +111,7 @@ impl<'a> Looked<'a> {
         self.on_target().map(f).sum()
     }
 
-    /// Error of the disparity that the recording holds at the target's samples, px.
+    /// Disparity error in the recording at the target's samples, px.
     fn errors(&self, cause: &Cause) -> Vec<f64> {
         let one = std::slice::from_ref(cause);
         let eye = self.eye.with(one);
@@ -127,8 +128,8 @@ impl<'a> Looked<'a> {
         self.on_target().map(|s| error(&s.site)).collect()
     }
 
-    /// Least squares of `delta`, px, at the target's samples by 1, u and v, each over its sigma: the
-    /// plane, in disparity about the principal point, and what it leaves of sum (delta/sigma)^2.
+    /// Weighted least squares of `delta`, px, at the target's samples by 1, u and v about the principal
+    /// point: the plane in disparity, and the remaining sum of (delta/sigma)^2.
     fn plane(&self, delta: &[f64]) -> (Vector3<f64>, f64) {
         let c = &self.eye.world.unit.sensor.camera;
         let column =
@@ -142,8 +143,8 @@ impl<'a> Looked<'a> {
 
 impl<'a> Ground<'a> {
     pub fn of(set: &'a Set) -> Self {
-        // A few pixels at the edges may be all there is to see. Odd, so that even and odd columns are
-        // met alike.
+        // Edge effects may show in a few pixels only. Strides are odd, so that even and odd columns are
+        // sampled alike.
         let fine = set.causes[set.known_causes..].iter().any(|c| c.label.axis == "edge-distance");
         let stride = match set.unit.sensor.camera.width {
             _ if fine => 1,
@@ -161,7 +162,7 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// Gain by knowing of `cause`; `None` where no strength makes it weak.
+    /// Gain from knowing `cause`; `None` where no strength makes it weak.
     pub fn nats(&self, cause: &Cause) -> Option<f64> {
         Some(match (&cause.worth, &cause.act) {
             (Worth::Never, _) => return None,
@@ -176,7 +177,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Gain by knowing that sigma is no longer what is `believed`.
+    /// Gain from knowing that sigma is no longer what is `believed`.
     pub fn nats_of_age(&self, believed: &Unit, aged: &Unit) -> f64 {
         let gain = |s: &Sample| {
             let Site { z, theta, .. } = s.site;
@@ -186,7 +187,7 @@ impl<'a> Ground<'a> {
         self.weight * self.views.iter().map(one).sum::<f64>() / self.repeats.squares
     }
 
-    /// The sum over views of their pixels on the target times `f`.
+    /// Sum over views of their pixels on the target times `f`.
     pub fn views(&self, f: impl Fn(&Looked<'_>) -> f64) -> f64 {
         self.weight * self.views.iter().map(|look| look.sum(|_| 1.0) * f(look)).sum::<f64>()
     }
@@ -200,8 +201,8 @@ impl<'a> Ground<'a> {
         self.views.iter().map(one).sum()
     }
 
-    /// What a reference distance tells of a shift of the plane on the axis, px: the tape errs, and
-    /// the plane's own depth too.
+    /// Gain from a reference distance about a shift of the plane on the axis, px; the tape and the plane's
+    /// own depth both have errors.
     fn of_reference(&self, look: &Looked<'_>, shift_px: f64, share: f64) -> f64 {
         let Some(tape_m) = self.reference_m else { return 0.0 };
         let z = look.plan().stage.board.depth(0.0, 0.0);
@@ -218,7 +219,7 @@ impl<'a> Ground<'a> {
             let mean = way.iter().sum::<f64>() / look.frames();
             let reach = look.plan().stage.board.reach;
             let moved: f64 = way.iter().map(|g| ((g - mean) / reach).powi(2)).sum();
-            // A board nearer by a share has its disparities larger by that share.
+            // Moving nearer by a fraction raises the disparities by that fraction.
             0.5 * moved * look.sum(|s| (s.site.disparity / s.sigma_px).powi(2))
         };
         self.weight * self.views.iter().map(one).sum::<f64>() / self.repeats.area
@@ -238,7 +239,7 @@ impl<'a> Ground<'a> {
         self.weight * self.views.iter().map(one).sum::<f64>()
     }
 
-    /// A shadow falls beside the board; every other loss counts on it.
+    /// Shadows fall beside the board, so all samples count; any other loss counts on the target only.
     fn of_loss(&self, cause: &Cause) -> f64 {
         let beside = cause.label.axis == "edge-distance";
         let rate = |site: &Site, plan: &Plan| {
@@ -257,8 +258,8 @@ impl<'a> Ground<'a> {
         self.weight * rates.iter().map(|(n, p)| n * gain(*p)).sum::<f64>()
     }
 
-    /// Every pixel's own constant of this size is met again in every frame of every view that shows
-    /// the target there.
+    /// A constant of this size in each pixel, seen again in every frame of every view that shows the
+    /// target there.
     pub fn of_pixels(&self, px: f64) -> f64 {
         let width = self.unit.sensor.camera.width;
         let mut known = BTreeMap::<usize, f64>::new();
@@ -271,7 +272,7 @@ impl<'a> Ground<'a> {
         self.weight * known.values().map(|q| of_effect(*q)).sum::<f64>()
     }
 
-    /// Every row's own shift of this size, fresh in every frame.
+    /// A shift of this size in each row, fresh in every frame.
     pub fn of_rows(&self, px: f64) -> f64 {
         let stride = self.weight.sqrt();
         let one = |look: &Looked<'_>| {
@@ -285,7 +286,7 @@ impl<'a> Ground<'a> {
         stride * self.views.iter().map(one).sum::<f64>()
     }
 
-    /// Every frame's own shift of this size; the plane of a view takes the mean of its frames.
+    /// A shift of this size in each frame; the plane of a view absorbs the mean of its frames.
     pub fn of_frames(&self, px: f64) -> f64 {
         let one = |look: &Looked<'_>| {
             let q = self.weight * look.sum(|s| (px / s.sigma_px).powi(2)) / self.repeats.area;

@@ -9,7 +9,6 @@ use super::worth::of_variance;
 use super::{Act, Cause, Clock, Draw, Phase, bias, loss, spread};
 use kinoise::rng::Stream;
 
-/// By name.
 pub const OUTSIDE: [&str; 14] = [
     "seam",
     "row-banding",
@@ -43,7 +42,7 @@ pub fn cause(name: &str, of: &Draw<'_>, rng: &mut Stream) -> Option<Cause> {
     })
 }
 
-/// One period from 0 to 1.
+/// Sine with one period from 0 to 1.
 fn wave(phase: f64) -> f64 {
     (TAU * phase).sin()
 }

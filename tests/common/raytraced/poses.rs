@@ -1,4 +1,4 @@
-//! Where the board stands, when, and what is noted about it.
+//! Where the board stands, when, and the notes about it.
 
 use nalgebra::Vector3;
 use rand::Rng;
@@ -12,16 +12,16 @@ use kinoise::camera::Camera;
 use kinoise::rng::Stream;
 use kinoise::view::{Region, TargetSize, ViewNotes};
 
-/// How a session is set up.
+/// Set-up of a session.
 #[derive(Debug, Clone)]
 pub struct Session {
     pub views: usize,
     pub frames: usize,
     /// Half the board's size, m; `None` for a wall larger than the picture.
     pub half: Option<[f64; 2]>,
-    /// From the board's middle to the wall behind it, m.
+    /// Distance from the board's centre to the wall behind it, m.
     pub gap_m: f64,
-    /// The greatest tilt, rad.
+    /// Maximum tilt, rad.
     pub steepest: f64,
     pub region: Marked,
     /// Error of the reference distances, m.
@@ -29,7 +29,7 @@ pub struct Session {
     pub conditions: bool,
 }
 
-/// What every view's notes say of where the board is.
+/// What every view's notes say about the board's region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Marked {
     Nothing,
@@ -37,16 +37,16 @@ pub enum Marked {
     Rectangle,
 }
 
-/// One view: what its causes may look at beside the pixel.
+/// One view: what causes may depend on besides the pixel.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// Its number in the session.
+    /// Its index in the session.
     pub view: usize,
     pub stage: Stage,
     pub stamps: Vec<f64>,
     /// Since the session began, s.
     pub session_s: f64,
-    /// Light of the room, lx.
+    /// Illuminance of the room, lx.
     pub lux: f64,
     pub temperature_c: f64,
     pub notes: ViewNotes,
@@ -54,17 +54,17 @@ pub struct Plan {
 
 const NEAREST_M: f64 = 0.8;
 const FARTHEST_M: f64 = 3.5;
-/// A wall goes on no farther within the picture.
+/// Maximum depth of a wall within the image.
 const WALL_ENDS_M: f64 = 5.0;
 const RATE_HZ: f64 = 30.0;
 
 impl Session {
-    /// Half the board's width, m; of a wall, what would be usual.
+    /// Half the board's width, m; for a wall, a usual value.
     pub fn half_m(&self) -> f64 {
         self.half.map_or(0.6, |half| half[0])
     }
 
-    /// All views in the order they are taken; distances, tilts and directions are shuffled apart.
+    /// All views in the order they are taken; distances, tilts and directions are shuffled independently.
     pub fn draw(&self, unit: &Unit, rng: &mut Stream) -> Vec<Plan> {
         let n = self.views;
         let (near, tilt, turn) = (scattered(n, rng), scattered(n, rng), scattered(n, rng));
@@ -82,7 +82,7 @@ impl Session {
             .collect()
     }
 
-    /// As much of a tilt as a wall can have within the picture; a board can have all of it.
+    /// The drawn tilt, limited for a wall to what fits in the image; a board can have all of it.
     pub fn within(&self, z: f64, drawn: f64, azimuth: f64, unit: &Unit) -> f64 {
         if self.half.is_some() {
             return drawn;
@@ -90,7 +90,8 @@ impl Session {
         drawn.min(wall_tilt(&unit.sensor.camera, z, azimuth, WALL_ENDS_M))
     }
 
-    /// A view by itself, at depth `z` and tilted; its clock is of the recording and of the session.
+    /// A single view at depth `z` with this tilt; `stamp` is on the recording's clock, `session_s` on
+    /// the session's.
     pub fn view(
         &self,
         unit: &Unit,
@@ -135,9 +136,9 @@ impl Session {
     }
 }
 
-/// As much as a wall can lean that goes on within the picture no farther than `ends_m`, rad.
+/// Maximum tilt, rad, of a wall that reaches no farther than `ends_m` within the image.
 pub fn wall_tilt(c: &Camera, z: f64, azimuth: f64, ends_m: f64) -> f64 {
-    // Where the wall leaves the picture, uphill: 1/z (1 - tan(theta) reach) = 1/ends_m.
+    // Where the wall leaves the image, uphill: 1/z (1 - tan(theta) reach) = 1/ends_m.
     let reach = 0.5
         * (c.width as f64 / c.fx * azimuth.cos().abs()
             + c.height as f64 / c.fy * azimuth.sin().abs());
@@ -148,21 +149,22 @@ fn tenth(px: f64) -> f64 {
     (10.0 * px).round() / 10.0
 }
 
-/// Along the picture's axes as often as not; `turn` of a full one, to a quarter of it.
+/// Azimuth about the image axis that `turn` (0 to 1) chooses: half the time within 0.1 rad of it, otherwise
+/// within 45 degrees.
 pub fn azimuth(turn: f64, rng: &mut Stream) -> f64 {
     let axis = FRAC_PI_2 * (4.0 * turn).floor();
     let reach = if rng.random::<bool>() { 0.1 } else { std::f64::consts::FRAC_PI_4 };
     axis + rng.random_range(-reach..reach)
 }
 
-/// Corners in the picture, px; `None` where one is behind the camera or next to it.
+/// Corners in the image, px; `None` where one is behind the camera or close to it.
 pub fn outline(unit: &Unit, corners: &[Vector3<f64>; 4]) -> Option<[[f64; 2]; 4]> {
     let c = &unit.sensor.camera;
     let seen = corners.iter().all(|p| p.z > 0.05);
     seen.then(|| corners.map(|p| [c.cx + c.fx * p.x / p.z, c.cy + c.fy * p.y / p.z]))
 }
 
-/// The largest rectangle of the picture's shape about the principal point that lies on the board.
+/// Largest rectangle with the image's aspect ratio about the principal point that lies on the board.
 fn rectangle(unit: &Unit, outline: &[[f64; 2]; 4]) -> [f64; 4] {
     let c = &unit.sensor.camera;
     let (width, height) = (c.width as f64 - 1.0, c.height as f64 - 1.0);

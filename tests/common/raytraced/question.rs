@@ -1,4 +1,4 @@
-//! What travels from the worlds that make sets to the solver and the judge.
+//! Types exchanged between the worlds that make sets, the solver and the judge.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ pub enum World {
     Real,
 }
 
-/// What kind of question a set puts.
+/// Kind of question that a set asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cell {
@@ -54,16 +54,16 @@ pub enum Cell {
     Halves,
 }
 
-/// What is ordered of a world.
+/// What is ordered from a world.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Asked {
     pub world: World,
     pub cell: Cell,
-    /// Effects or causes by name; by lot where none is named.
+    /// Effects or causes by name; chosen at random where empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
-    /// Expected log-likelihood that who knows the truth gains over the model, nats over the whole
-    /// recording after planes are fitted, for every concealed cause; or as near as can be reached.
+    /// Expected log-likelihood gain of knowing the truth over the model, nats over the whole recording after
+    /// planes are fitted, for every concealed cause; or as near as can be reached.
     pub nats: Option<f64>,
     pub seed: u64,
     /// 160x120 instead of 320x240.
@@ -73,17 +73,17 @@ pub struct Asked {
 /// One cause that was concealed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hidden {
-    /// Ids of the catalogue that count as its name; none where the catalogue lacks it.
+    /// Catalogue ids that count as its name; empty where the catalogue lacks it.
     pub names: Vec<String>,
-    /// The formula or the switch that was used, in a word.
+    /// The formula or switch used, in a word.
     pub form: String,
     pub statistic: String,
     pub axis: String,
-    /// Axes on which it shows as well.
+    /// Further axes on which it shows.
     #[serde(default)]
     pub also: Vec<String>,
     pub interval: Option<[f64; 2]>,
-    /// In the catalogue's names and units where the forms have them in common.
+    /// In the catalogue's names and units where the forms share them.
     pub parameters: Map<String, Value>,
     pub nats: Option<f64>,
 }
@@ -102,7 +102,7 @@ impl Hidden {
         }
     }
 
-    /// The first of its names, or its form.
+    /// Its first name, or its form.
     pub fn name(&self) -> &str {
         self.names.first().unwrap_or(&self.form)
     }
@@ -114,14 +114,14 @@ pub struct Truth {
     pub asked: Asked,
     /// Empty where the right answer is "match".
     pub hidden: Vec<Hidden>,
-    /// How the recording was taken; for readers.
+    /// How the recording was made; for readers.
     pub base: Value,
 }
 
 /// A view that the solver never gets: what an ideal sensor of the same unit reports, without noise.
 pub struct ExamView {
     pub sensor: Sensor,
-    /// Outside the distances or tilts of the recording.
+    /// Whether it is outside the distances or tilts of the recording.
     pub beyond: bool,
     pub conditions: Conditions,
     /// Mean of what is reported, concealed causes included, m; NaN off the target.
@@ -133,8 +133,8 @@ pub struct ExamView {
     pub sigma_plain: Vec<f32>,
 }
 
-/// How the target stands in a view: where its plane meets the optical axis, m, its tilt, and where
-/// its depth grows to (0 along the columns), rad.
+/// Pose of the target in a view: depth at which its plane meets the optical axis, m, tilt, and the image
+/// direction in which its depth grows (0 to the right), rad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     pub z_m: f64,
@@ -146,18 +146,17 @@ pub struct Pose {
 pub trait ConcealedSet: Send + Sync {
     fn truth(&self) -> Truth;
 
-    /// Write `recording/` and either `model.json` or `simulated/` into `folder`, and nothing else.
-    /// The same bytes every time.
+    /// Writes `recording/` and either `model.json` or `simulated/` into `folder`, and nothing else. The
+    /// bytes are the same every time.
     fn write(&self, folder: &Path) -> Result<()>;
 
-    /// Fresh views for the examination of what was learnt; none where the world has no truth without
-    /// noise.
+    /// Fresh views for examining what was learnt; empty where the world has no noise-free truth.
     fn exam(&self) -> Vec<ExamView> {
         Vec::new()
     }
 
-    /// The same set with one view more, as near to `pose` as its stage permits, and the pose that was
-    /// taken; the other views are the same to the last byte. None where the session is over for good.
+    /// The same set with one more view, as near to `pose` as its stage permits, and the pose that was taken;
+    /// the other views stay identical to the last byte. `None` where no more views can be taken.
     fn with_view(&self, _pose: &Pose) -> Result<Option<(Pose, Box<dyn ConcealedSet>)>> {
         Ok(None)
     }

@@ -1,4 +1,4 @@
-//! What goes into a set: drawn at random from its order.
+//! Contents of a set, drawn at random from its order.
 
 use rand::Rng;
 use serde_json::{Value, json};
@@ -19,7 +19,7 @@ use kinoise::rng::{Seed, Stream};
 #[derive(Debug, Clone)]
 pub struct Order {
     pub cell: Cell,
-    /// Of the catalogue or from outside it; by lot where none is named. Two, for a pair.
+    /// From the catalogue or outside it; chosen at random where empty. Two for a pair.
     pub effects: Vec<String>,
     /// 1 is the middle of what real units show.
     pub strength: f64,
@@ -31,23 +31,23 @@ pub struct Order {
 
 /// A recording to be taken, and its concealed truth.
 pub struct Set {
-    /// Says nothing.
+    /// Reveals nothing.
     pub name: String,
     pub order: Order,
     pub unit: Unit,
-    /// What the model file says, which may be wrong.
+    /// The unit as the model file describes it, which may be wrong.
     pub described: Unit,
     /// First those that the model knows, then the concealed ones.
     pub causes: Vec<Cause>,
     pub known_causes: usize,
     pub plans: Vec<Plan>,
-    /// Bits of an infrared image.
+    /// Bits per pixel of the infrared images; `None` without them.
     pub infrared_bits: Option<u8>,
-    /// Patches of grey are printed on the board.
+    /// Whether grey patches are printed on the board.
     pub printed: bool,
     pub seed: Seed,
     pub session: Session,
-    /// One for each cause after the known; the ageing of the unit, where that is all.
+    /// One for each cause after the known ones; the unit's ageing, where that is all.
     pub concealed: Vec<Concealed>,
     gate: Option<Gate>,
 }
@@ -56,15 +56,15 @@ pub struct Set {
 #[derive(Debug, Clone)]
 pub struct Concealed {
     name: String,
-    /// What it is drawn from, so that it can be drawn again at another strength.
+    /// State of the random stream, so that it can be drawn again at another strength.
     start: Stream,
     pub strength: f64,
-    /// What knowing of it is worth; `None` where that was not asked or cannot be said.
+    /// What knowing it is worth; `None` where that was not asked or cannot be said.
     pub nats: Option<f64>,
 }
 
 impl Set {
-    /// Drawn from the order's seed, at the order's strength.
+    /// Draws a set from the order's seed, at the order's strength.
     pub fn draw(order: Order) -> Result<Self> {
         let Order { cell, effects, strength, seed, .. } = &order;
         let text = format!("{cell:?}/{effects:?}/{strength}/{seed}");
@@ -72,9 +72,9 @@ impl Set {
         Self::of(order, width, &text)
     }
 
-    /// The set that is `asked`, as strong as it is to be worth, with so many views and frames; by lot
-    /// where none are given. The same seed gives the same recording but for the strength of what is
-    /// concealed.
+    /// The set that is `asked`, with the strength that is worth the nats asked for. Views and frames
+    /// are drawn where not given. The same seed gives the same recording except for the strength of
+    /// what is concealed.
     pub fn asked(asked: &Asked, views: Option<usize>, frames: Option<usize>) -> Result<Self> {
         let Asked { cell, seed, small, .. } = *asked;
         if matches!(cell, Cell::Amnesia | Cell::Halves) {
@@ -88,12 +88,12 @@ impl Set {
         let order = Order { cell, effects, strength: 1.0, seed, views, frames, small };
         let mut set = Set::of(order, if small { 160 } else { 320 }, &text)?;
         set.name = sha256_hex(format!("opaque {text}/{:?}", asked.nats).as_bytes())[..10].into();
-        // What nobody can see has no strength at which it is seen.
+        // What cannot be seen has no strength at which it is seen.
         set.weigh(asked.nats.filter(|_| cell != Cell::Blind))?;
         Ok(set)
     }
 
-    /// Drawn from `text`; the picture is `width` px wide.
+    /// Draws a set from `text`; its images are `width` px wide.
     fn of(order: Order, width: usize, text: &str) -> Result<Self> {
         let digest = sha256_hex(text.as_bytes());
         let seed = seed_of(&digest);
@@ -150,7 +150,7 @@ impl Set {
         })
     }
 
-    /// The `k`th concealed cause as it would be at another strength.
+    /// The `k`th concealed cause at another strength.
     pub fn at_strength(&self, k: usize, strength: f64) -> Result<Cause> {
         let Concealed { name, start, .. } = &self.concealed[k];
         let (shadow, half_m) = (strength.min(1.0), self.session.half_m());
@@ -162,14 +162,14 @@ impl Set {
         }
     }
 
-    /// The described unit, so much older.
+    /// The described unit, aged by `strength`.
     pub fn aged(&self, strength: f64) -> Unit {
         let mut unit = self.described.clone();
         age(&mut unit, strength, &mut self.concealed[0].start.clone());
         unit
     }
 
-    /// What looks where only the known causes act.
+    /// The world in which only the known causes act.
     pub fn world(&self) -> World<'_> {
         World {
             unit: &self.unit,
@@ -179,7 +179,7 @@ impl Set {
         }
     }
 
-    /// What is known of the unit.
+    /// Model file of the unit: what is known of it.
     pub fn model(&self) -> Result<NoiseModel> {
         let known = self.causes[..self.known_causes].iter().map(|cause| Effect {
             id: cause.label.names[0].clone(),
@@ -202,7 +202,7 @@ impl Set {
         all
     }
 
-    /// The answer, and how the set was made.
+    /// The answer and how the set was made.
     pub fn truth(&self) -> Value {
         let hidden = self.hidden();
         let effects = hidden.iter().zip(&self.concealed).map(|(hidden, concealed)| {
@@ -222,7 +222,7 @@ impl Set {
         })
     }
 
-    /// How the recording was taken.
+    /// How the recording was made.
     pub fn base(&self) -> Value {
         let known = &self.causes[..self.known_causes];
         let notes = self.plans.first().map(|p| &p.notes);

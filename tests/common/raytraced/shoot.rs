@@ -1,4 +1,4 @@
-//! Taking a view: what stands still is worked out once, then frame by frame.
+//! Takes a view: computes what is constant once, then each frame.
 
 use rand::Rng;
 
@@ -8,13 +8,13 @@ use super::poses::Plan;
 use super::{Act, Cause, Clock, Set, Unit};
 use kinoise::frame::Frame;
 
-/// Landau, Choo and Beling 2015: 10-bit numbers from a white surface 1 m away, and read noise.
+/// Landau, Choo and Beling 2015: 10-bit signal of a white surface 1 m away, and read noise.
 const DN_AT_1_M: f64 = 590.0;
 const READ_DN: f64 = 10.4;
-/// What an office's light adds to a white surface.
+/// Signal that a lux of room light adds on a white surface.
 const DN_A_LUX: f64 = 0.06;
 
-/// What the causes of a pixel come to.
+/// Combined effect of all causes on a pixel.
 pub struct Sum {
     /// px.
     pub error: f64,
@@ -42,16 +42,16 @@ impl Sum {
     }
 }
 
-/// Inverse depth a pixel to the side along the slope, 1/m.
+/// Change of inverse depth per pixel along the slope, 1/m.
 pub fn slope(unit: &Unit, plan: &Plan) -> f64 {
     let (c, board) = (&unit.sensor.camera, &plan.stage.board);
     (board.normal.x / c.fx).hypot(board.normal.y / c.fy) / board.reach
 }
 
-/// What stands still of a pixel.
+/// Constant part of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pixel {
-    /// Matched, px; NaN where nothing is.
+    /// Matched disparity, px; NaN where there is none.
     pub disparity: f32,
     /// m.
     pub sigma: f32,
@@ -66,7 +66,7 @@ pub struct Pixel {
 const NOTHING: Pixel =
     Pixel { disparity: f32::NAN, sigma: 0.0, gain: 1.0, loss: 0.0, on_board: false, light: 0.0 };
 
-/// A view that stands still.
+/// Constant part of a view.
 pub struct Still<'a> {
     set: &'a Set,
     plan: &'a Plan,
@@ -110,7 +110,7 @@ impl<'a> Still<'a> {
         field
     }
 
-    /// Depth, m, as the driver has it before it is stored; NaN where nothing is.
+    /// Depth, m, as the driver has it before it is stored; NaN where there is none.
     pub fn depth(&self, frame: usize) -> Vec<f32> {
         let clock = self.clock(frame);
         let fb = self.set.unit.disparity_px_m() as f32;
@@ -138,7 +138,7 @@ impl<'a> Still<'a> {
         depth
     }
 
-    /// The ray trembles over the board's slope.
+    /// Jitters the rays over the board's slope.
     fn tremble(&self, depth: &mut [f32], clock: &Clock) {
         let slope = slope(&self.set.unit, self.plan) as f32;
         for act in self.acts() {
@@ -178,7 +178,7 @@ impl<'a> Still<'a> {
         }
     }
 
-    /// As stored.
+    /// The depth frame as stored.
     pub fn words(&self, frame: usize) -> Frame {
         let scale = self.set.unit.units_per_metre() as f32;
         let word = |z: &f32| {
@@ -188,7 +188,7 @@ impl<'a> Still<'a> {
         self.image(self.depth(frame).iter().map(word).collect())
     }
 
-    /// Amplitude, 10-bit numbers.
+    /// The infrared frame, 10-bit numbers.
     pub fn infrared(&self, frame: usize) -> Frame {
         let noise = white(self.pixels.len(), self.clock(frame).stream("infrared"));
         let number = |(pixel, n): (&Pixel, f32)| {
@@ -210,7 +210,7 @@ fn pixel(set: &Set, site: &Site, plan: &Plan, rounding: f64) -> Pixel {
     let lit = site.facing / site.point.norm_squared();
     Pixel {
         disparity: (site.disparity + sum.error) as f32,
-        // The stored number's own rounding is part of what was calibrated.
+        // The calibrated sigma already includes the rounding of the stored number.
         sigma: (sum.spread * (base * base - rounding).max(0.0).sqrt()) as f32,
         gain: sum.gain as f32,
         loss: (1.0 - sum.answer) as f32,

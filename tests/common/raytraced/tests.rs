@@ -1,4 +1,5 @@
-//! Oracles: geometry without noise, where and to which side each cause acts, what a set gives away.
+//! Tests of the geometry without noise, of where and with which sign each cause acts, and of what a
+//! set gives away.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -13,7 +14,7 @@ pub fn asked(cell: Cell, names: &[&str], nats: Option<f64>, seed: u64) -> Asked 
     Asked { world: World::Rays, cell, names, nats, seed, small: true }
 }
 
-/// Every file of a set by its name, as it is written.
+/// All files of a set by name, as written.
 pub fn files(set: &dyn ConcealedSet) -> BTreeMap<String, Vec<u8>> {
     fn walk(root: &Path, folder: &Path, all: &mut BTreeMap<String, Vec<u8>>) {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -90,7 +91,7 @@ fn every_cause_changes_what_it_should_and_nothing_else() {
         assert!(with.iter().zip(&without).any(|(a, b)| a.2 != b.2), "{name} does nothing");
         assert_eq!(lost(&with) > lost(&without), cause.label.statistic == "missing", "{name}");
         match cause.act {
-            // A bent board or ray is met at another distance, where sigma is another.
+            // A bent board or ray is met at another distance, where sigma differs.
             Act::Ray(_) | Act::Lift(_) => assert!(moves && !shapes, "{name}"),
             Act::Mismatch(_) => assert!(moves && !spreads && !shapes, "{name}"),
             Act::Spread(_) => assert!(!moves && spreads && !shapes, "{name}"),
@@ -100,7 +101,7 @@ fn every_cause_changes_what_it_should_and_nothing_else() {
     }
 }
 
-/// Mean depth on the board goes to the side that the label says.
+/// Mean depth on the board shifts in the direction that the label says.
 #[test]
 fn causes_act_with_the_sign_they_are_labelled_with() {
     let signed = [
@@ -167,8 +168,8 @@ fn masks_act_where_they_say() {
     }
 }
 
-/// The same bytes every time, the cause's name nowhere, no file or key that a null lacks; a view more
-/// changes none of the others and comes after them.
+/// The same bytes every time, the cause's name nowhere, no key that a null lacks. One more view changes none
+/// of the others and comes after them.
 #[test]
 fn a_written_set_gives_nothing_away() {
     let of = asked(Cell::FewViews, &["vignetting"], Some(50.0), 5);

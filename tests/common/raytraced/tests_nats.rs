@@ -1,4 +1,4 @@
-//! What knowing is worth, by other ways: by hand, and by drawing the noise and counting.
+//! Checks the worth of knowing in other ways: by hand, and by simulating the noise.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,7 +9,7 @@ use super::weigh::strength_for;
 use super::{CATALOGUE, Cell, OUTSIDE, Set, spread};
 use kinoise::rng::Seed;
 
-/// With white noise: no window that the model knows of.
+/// A set with white noise: no window that the model knows of.
 fn white(cell: Cell, names: &[&str], nats: Option<f64>) -> Set {
     let sets = (0..50).map(|seed| Set::asked(&asked(cell, names, nats, seed), Some(8), Some(3)));
     sets.map(Result::unwrap).find(|set| set.known_causes == 0).unwrap()
@@ -24,9 +24,8 @@ fn a_tenth_more_noise_is_worth_what_the_formula_says() {
     assert!((got / hand - 1.0).abs() < 1e-9, "{got} {hand}");
 }
 
-/// Log-likelihood of who knows the bias over who does not, for noise drawn afresh and a plane fitted
-/// to each view: its mean is what the set says within four standard errors of 40 draws, which one in
-/// 16,000 sets is not.
+/// Log-likelihood gain of knowing the bias, for fresh noise and a plane fitted to each view. Its mean over
+/// 40 draws is what the set says within four standard errors, which one set in 16,000 exceeds.
 #[test]
 fn fifty_nats_are_fifty_nats() {
     let mut set = white(Cell::Single, &["radial-disparity-bias"], Some(50.0));
@@ -85,7 +84,7 @@ fn what_is_asked_is_reached() {
         let near = (got / 150.0 - 1.0).abs() < 0.05;
         assert!(near || strength >= 8.0, "{name}: {got} at {strength}");
     }
-    // Nothing at all below a threshold, then steeply; and nothing ever.
+    // Worth nothing below a threshold and rising steeply above it; and never worth enough.
     let cliff = |s: f64| Ok(if s < 0.3 { 0.0 } else { 1e5 * (s - 0.3) });
     assert!((strength_for(50.0, cliff).unwrap().1 / 50.0 - 1.0).abs() < 0.02);
     assert_eq!(strength_for(50.0, |_| Ok(3.0)).unwrap(), (8.0, 3.0));

@@ -1,4 +1,4 @@
-//! A unit: its camera, and how noisy it is.
+//! A unit: its camera and its noise.
 
 use rand::Rng;
 
@@ -11,9 +11,9 @@ use kinoise::view::{RecordingFile, Sensor};
 
 /// Yamaguchi et al. 2016, Eq. 1, m and rad.
 const PAPER: [f64; 6] = [0.00151, 0.00215, 0.483, 1.88e-6, 2.01, 1.39];
-/// Units differ by this share.
+/// Relative spread between units.
 const SPREAD: f64 = 0.2;
-/// Where sigma is given, m and rad: short of the pole.
+/// Range where sigma is given, m and rad: short of the pole.
 const VALID_M: [f64; 2] = [0.3, 6.5];
 const VALID_RAD: [f64; 2] = [0.0, 1.34];
 
@@ -27,7 +27,7 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Drawn at random, its picture `width` px wide and three quarters as high.
+    /// Draws a unit at random, with images `width` px wide and three quarters as high.
     pub fn draw(width: usize, units_per_metre: f64, rng: &mut Stream) -> Self {
         let (shrink, height) = (width as f64 / 640.0, width * 3 / 4);
         let fx = shrink * rng.random_range(540.0..600.0);
@@ -69,12 +69,12 @@ impl Unit {
         a + b * (z - c).powi(2) + d * z.powf(e) * (theta / (f - theta)).powi(2)
     }
 
-    /// What a picture of a quarter of the pixels shrinks errors in px to.
+    /// Factor on errors in px for images smaller than 640 px wide.
     pub fn scale(&self) -> f64 {
         self.sensor.camera.width as f64 / 640.0
     }
 
-    /// Of the stored depth, 1/m.
+    /// Units of the stored depth, 1/m.
     pub fn units_per_metre(&self) -> f64 {
         match self.sensor.code {
             DepthCode::Metric { units_per_metre, .. } => units_per_metre,
@@ -87,7 +87,7 @@ impl Unit {
         self.sensor.camera.fx * self.baseline_m
     }
 
-    /// The model file's content: what is known of this unit.
+    /// Content of the model file: what is known of this unit.
     pub fn model(&self, effects: Vec<Effect>) -> Result<NoiseModel> {
         let domain = Domain { z_m: VALID_M, theta_rad: VALID_RAD };
         Ok(NoiseModel {

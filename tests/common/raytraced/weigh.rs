@@ -1,19 +1,19 @@
-//! How strong what is concealed must be to be worth so much.
+//! Finds the strength at which what is concealed is worth a given number of nats.
 
 use super::nats::{Ground, Repeats};
 use super::{Cell, Set};
 use kinoise::error::Result;
 
 impl Set {
-    /// Give every concealed cause the strength at which knowing of it is worth `wanted` nats; where
-    /// nothing is wanted, say what it is worth.
+    /// Gives every concealed cause the strength at which knowing it is worth `wanted` nats; without
+    /// `wanted`, computes what it is worth as it is.
     pub fn weigh(&mut self, wanted: Option<f64>) -> Result<()> {
         if self.order.cell == Cell::Drift {
             return self.weigh_age(wanted);
         }
         let mut ground = Ground::of(self);
         let mut done = Vec::new();
-        // Whether neighbours err together counts for all others.
+        // Correlated noise first: it affects the worth of all others.
         let mut turns: Vec<usize> = (0..self.concealed.len()).collect();
         turns.sort_by_key(|k| self.causes[self.known_causes + k].window.is_none());
         for k in turns {
@@ -50,13 +50,13 @@ impl Set {
     }
 }
 
-/// The strength at which `nats` gives what is `wanted`, and what it gives there; the strongest there
-/// is where it never does.
+/// Strength at which `nats` gives what is `wanted`, and its value there; the end of the range where
+/// it never does.
 pub fn strength_for(wanted: f64, mut nats: impl FnMut(f64) -> Result<f64>) -> Result<(f64, f64)> {
     const WEAKEST: f64 = 1e-6;
     const STRONGEST: f64 = 8.0;
     const NEAR: f64 = 0.02;
-    // ln of the strength, and ln of what it is worth over what is wanted.
+    // (ln strength, ln(worth / wanted)) on either side.
     let (mut low, mut high) = (None, None);
     let mut s = 1.0;
     let mut got = nats(s)?;
@@ -67,7 +67,7 @@ pub fn strength_for(wanted: f64, mut nats: impl FnMut(f64) -> Result<f64>) -> Re
         }
         let here = (f64::ln(s), (got / wanted).max(1e-12).ln());
         *(if got < wanted { &mut low } else { &mut high }) = Some(here);
-        // Twice the strength is worth four times as much, unless a bracket says otherwise.
+        // Without a bracket, twice the strength is taken to be worth four times as much.
         let alone = |(s, off): (f64, f64)| s - (0.5 * off).clamp(-2.5, 2.5);
         let next = match (low, high) {
             (Some(l), Some(h)) if round % 3 == 2 || l.1 < -10.0 => 0.5 * (l.0 + h.0),

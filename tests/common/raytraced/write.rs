@@ -1,4 +1,4 @@
-//! A set on disk: the recording, the model file, the truth; and as the trial asks for it.
+//! A set on disk: the recording, the model file, the truth; and the set as the trial asks for it.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -16,7 +16,7 @@ use kinoise::error::{Error, Result};
 use kinoise::frame::Frame;
 use kinoise::io::{encode_png16_quickly, write_recording_file, write_view_notes};
 
-/// Write `set` into `root`: `<name>/`, `model/<name>.json`, `truth/<name>.json`.
+/// Writes `set` into `root`: `<name>/`, `model/<name>.json`, `truth/<name>.json`.
 pub fn write(set: &Set, root: &Path) -> Result<()> {
     for sub in [&root.join("model"), &root.join("truth")] {
         fs::create_dir_all(sub).map_err(|e| Error::write(sub, e))?;
@@ -44,7 +44,7 @@ fn recording(set: &Set, folder: &Path) -> Result<()> {
     })
 }
 
-/// The images of a view, each taken at a time, s, and their list; `kind` is depth or ir.
+/// Writes the images of a view, each with its time stamp, s, and their list; `kind` is depth or ir.
 pub fn images(
     view: &Path,
     kind: &str,
@@ -62,7 +62,7 @@ pub fn images(
     save(&view.join(format!("{kind}.txt")), list.as_bytes())
 }
 
-/// Ten bits as they are, or the upper eight of them.
+/// Encodes the ten bits as they are, or their upper eight.
 fn infrared(image: &Frame, bits: u8) -> Result<Vec<u8>> {
     if bits == 16 {
         return encode_png16_quickly(image);
@@ -117,8 +117,8 @@ impl ConcealedSet for Raytraced {
 }
 
 impl Set {
-    /// Take a view after all others, by the same unit of the same target with the same causes at
-    /// work. A wall leans no farther than it goes on in the picture. The pose that was taken.
+    /// Adds a view after all others, by the same unit of the same target with the same causes. A wall's tilt
+    /// is limited to what fits in the image. Returns the pose that was taken.
     pub fn add_view(&mut self, pose: &Pose) -> Pose {
         let mut rng = self.seed.stream("rays/advised");
         let (stamp, session_s) =

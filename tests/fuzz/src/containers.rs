@@ -1,10 +1,10 @@
-//! Films in one file: bags of ROS 1 and ROS 2, MCAP, NumPy's arrays.
+//! Films in one file: ROS 1 and ROS 2 bags, MCAP, NumPy arrays.
 
 use kinoise::io::{Assumed, open_uncut};
 
 use super::desk::{Desk, assumed, check};
 
-/// A film that opens has frames or errors; what says no camera is opened with one that is given.
+/// Checks a film if it opens; one without a camera or depth code is opened with a given one.
 fn film(name: &str, data: &[u8]) -> bool {
     thread_local! {
         static DESK: Desk = Desk::new(&[]);

@@ -1,4 +1,4 @@
-//! A folder to put a reader's files in, and what holds of every recording that was opened.
+//! A folder for a reader's files, and checks that hold for every recording that opens.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ pub fn sensor() -> Sensor {
     }
 }
 
-/// What fits its images.
+/// Assumptions that fit its images.
 pub fn assumed() -> Assumed {
     let Sensor { camera, code, .. } = sensor();
     let intrinsics = Some([camera.fx, camera.fy, camera.cx, camera.cy]);
@@ -60,10 +60,11 @@ pub fn frame_png() -> Vec<u8> {
     encode_png16(&frame()).expect("encoded")
 }
 
-/// Frames that are looked at: more say no more.
+/// Maximum number of frames to check: more show nothing new.
 const MAX_FRAMES: usize = 64;
 
-/// Its numbers are numbers, and every frame is one or an error, the same in whatever order.
+/// Checks that the recording's numbers are valid, and that every frame is one or an error, whatever the
+/// order of reading.
 pub fn check(recording: &Recording) {
     check_sensor(&recording.sensor);
     let frames: Vec<&FrameRef> =

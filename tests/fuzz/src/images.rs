@@ -14,7 +14,7 @@ thread_local! {
 /// The first bytes of every PNG.
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// With the right checksums: with wrong ones nothing behind a chunk is looked at.
+/// The PNG with corrected checksums: with wrong ones nothing behind a chunk is looked at.
 fn with_checksums(data: &[u8]) -> Vec<u8> {
     let mut png = data.to_vec();
     let mut at = SIGNATURE.len();
@@ -30,7 +30,7 @@ fn with_checksums(data: &[u8]) -> Vec<u8> {
     png
 }
 
-/// The size that the header of a PNG says.
+/// Image size in the header of a PNG.
 fn size(png: &[u8]) -> Option<[usize; 2]> {
     let header = png.strip_prefix(SIGNATURE)?.get(8..16)?;
     let number = |at: usize| {
@@ -39,7 +39,7 @@ fn size(png: &[u8]) -> Option<[usize; 2]> {
     Some([number(0), number(4)])
 }
 
-/// A 16-bit PNG, read as what its header says.
+/// A 16-bit PNG, read with the size in its header.
 pub fn depth_png(data: &[u8]) -> bool {
     let png = with_checksums(data);
     let [width, height] = size(&png).unwrap_or([8, 6]);
@@ -54,10 +54,10 @@ pub fn depth_png(data: &[u8]) -> bool {
     })
 }
 
-/// Larger ones cost time and show nothing else, px.
+/// Maximum size of an image, px: larger ones take time and show nothing new.
 const MAX_PICTURE: usize = 1 << 16;
 
-/// Infrared and colour, PNG or JPEG, read as what a PNG's header says.
+/// Infrared and colour, PNG or JPEG, read with the size in a PNG's header.
 pub fn picture(data: &[u8]) -> bool {
     let png = with_checksums(data);
     let small = |[w, h]: &[usize; 2]| w.saturating_mul(*h) <= MAX_PICTURE;
@@ -75,7 +75,7 @@ pub fn picture(data: &[u8]) -> bool {
 
 const PGM: &str = "d-1.000000-60000000.pgm";
 
-/// A fakenect dump: with an even first byte the others are its index, with an odd one its image.
+/// A fakenect dump: after an even first byte the other bytes are its index, after an odd one its image.
 pub fn dump(data: &[u8]) -> bool {
     thread_local! {
         static DUMP: Desk = Desk::new(&[]);
@@ -87,7 +87,7 @@ pub fn dump(data: &[u8]) -> bool {
             true => (desk.put(PGM, &encode_pgm16(&frame())), desk.put("INDEX.txt", bytes)),
             false => (desk.put(PGM, bytes), desk.put("INDEX.txt", PGM.as_bytes())),
         };
-        // Of images of 640 x 480 px alone the camera is known.
+        // The camera is known for images of 640 x 480 px only.
         let camera = Assumed { code: None, ..assumed() };
         let Ok(recording) = open_uncut(desk.root(), &camera) else { return false };
         check(&recording);

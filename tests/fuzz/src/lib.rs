@@ -1,5 +1,5 @@
-//! What the fuzz targets do with their bytes: one function a reader. Each asserts more than that nothing
-//! panics: what is read and written again reads the same, and no number is NaN or infinite.
+//! Bodies of the fuzz targets, one function per reader. Each asserts more than the absence of panics: what
+//! is read and written again reads the same, and no number is NaN or infinite.
 //!
 //! `tests/product/fuzz_corpus.rs` runs the kept corpora through the same functions, on stable Rust.
 
@@ -16,10 +16,10 @@ pub use lists::{list, scenes, trajectory};
 pub use numbers::{diagnosis, model, ply, table};
 pub use recording::{recording, view};
 
-/// Says whether the bytes were read, not refused.
+/// Returns whether the bytes were read, not refused.
 pub type Target = fn(&[u8]) -> bool;
 
-/// Every target by its name, which is that of its corpus too.
+/// Every target by its name, which is also that of its corpus.
 pub const TARGETS: [(&str, Target); 16] = [
     ("recording", recording),
     ("view", view),

@@ -1,4 +1,4 @@
-//! Lists and trajectories: the TUM layout's, 7-Scenes' poses.
+//! Lists and trajectories of the TUM layout, and poses of 7-Scenes.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use kinoise::trajectory::{Pose, Trajectory, read_benchmark, read_trajectory, tum
 
 use super::desk::{Desk, assumed, check_sensor, frame_png, read, sensor};
 
-/// The lists of a TUM folder, and what each is when another one is under test.
+/// The lists of a TUM folder, with their content while another one is under test.
 const LISTS: [(&str, &str); 4] = [
     ("depth.txt", "0.0 0.png\n0.1 1.png\n0.2 2.png\n"),
     ("rgb.txt", "0.01 0.png\n0.11 1.png\n"),
@@ -17,7 +17,7 @@ const LISTS: [(&str, &str); 4] = [
     ("groundtruth.txt", "0 0 0 0 0 0 0 1\n0.1 0 0 0.1 0 0 0 1\n"),
 ];
 
-/// The first byte says which list the others are; associations stand in for rgb.txt.
+/// The first byte selects the list that the other bytes are; associations replace rgb.txt.
 pub fn list(data: &[u8]) -> bool {
     thread_local! {
         static DESK: Desk = {
@@ -33,7 +33,7 @@ pub fn list(data: &[u8]) -> bool {
         let path = |k: usize| desk.root().join(LISTS[k].0);
         for (k, (name, usual)) in LISTS.iter().enumerate() {
             let _ = std::fs::remove_file(path(k));
-            // Each of the two makes the other unread.
+            // With either of rgb.txt and associations.txt, the other is not read.
             let is_there = !matches!((tested, k), (1, 2) | (2, 1));
             if k == tested {
                 desk.put(name, text);
@@ -90,7 +90,7 @@ pub fn trajectory(data: &[u8]) -> bool {
             check_poses(&poses);
             let again = desk.put("again.txt", tum_text(&poses).as_bytes());
             let again = read_benchmark(&again).expect("what was written is read").poses;
-            // Written to the microsecond: closer stamps are one.
+            // Stamps are written to the microsecond: closer ones become equal.
             if again.len() == poses.len() {
                 for (a, b) in poses.iter().zip(&again) {
                     let off = a.world_from_camera.inv_mul(&b.world_from_camera);

@@ -16,7 +16,7 @@ thread_local! {
     static DESK: Desk = Desk::new(&[]);
 }
 
-/// model.json, and the correction that it makes of depths.
+/// model.json, and its correction of depths.
 pub fn model(data: &[u8]) -> bool {
     DESK.with(|desk| {
         let Ok(model) = NoiseModel::read(&desk.put("model.json", data)) else {
@@ -77,7 +77,7 @@ pub fn diagnosis(data: &[u8]) -> bool {
     })
 }
 
-/// Rows to which models are fitted.
+/// Maximum number of rows to which models are fitted.
 const MAX_ROWS: usize = 48;
 
 /// The table that `fit` reads, written and fitted.
@@ -99,7 +99,7 @@ pub fn table(data: &[u8]) -> bool {
         for form in [None, Some(Form::Paper)] {
             let options = CalibrateOptions { form, ..CalibrateOptions::default() };
             let Ok(fitted) = model_of_table(&table, &path, &options) else { continue };
-            // What cannot be written is refused there; what is written is read.
+            // A model that cannot be written is refused there; one that is written can be read.
             let Ok(text) = fitted.model.to_json() else { continue };
             let read = NoiseModel::read(&desk.put("model.json", text.as_bytes()));
             check_sigma(&read.expect("what was written is read").sigma);
@@ -108,7 +108,7 @@ pub fn table(data: &[u8]) -> bool {
     })
 }
 
-/// Views numbered in the order of their rows.
+/// Renumbers the views in the order of their rows.
 fn numbered(mut table: SigmaTable) -> SigmaTable {
     let mut seen = Vec::new();
     for row in &mut table.rows {
@@ -121,11 +121,11 @@ fn numbered(mut table: SigmaTable) -> SigmaTable {
     table
 }
 
-/// Bytes of a point in the file: nine floats but for three bytes of colour.
+/// Bytes per point in the file: seven floats and three bytes of colour.
 const POINT: usize = 31;
 const FLOATS: [usize; 7] = [0, 4, 8, 12, 16, 20, 27];
 
-/// The bytes are points; written as PLY they are there again, behind a header that counts them.
+/// The bytes are points; the PLY file has them unchanged after a header with their number.
 pub fn ply(data: &[u8]) -> bool {
     let points: Vec<MapPoint> = data.chunks_exact(POINT).map(point).collect();
     let file = ply_of(&points);

@@ -1,4 +1,4 @@
-//! Damage of any kind, through the library.
+//! Files damaged at random, through the library.
 
 use super::*;
 
@@ -32,7 +32,7 @@ impl Damage {
     }
 }
 
-/// Four frontal views, so that a fit takes no time; spoiled and mended again by every case.
+/// Four frontal views, so that a fit is fast; every case damages and restores them.
 fn small() -> &'static Bench {
     static SMALL: std::sync::OnceLock<Bench> = std::sync::OnceLock::new();
     SMALL.get_or_init(|| {

@@ -137,7 +137,7 @@ fn a_lens_that_not_every_pixel_has_a_ray_through() {
     bench.calibrate().tells(&["12 of 12 views"]);
 }
 
-/// A key that nobody reads may be a slip; files of a later layout must still open.
+/// An unknown key may be a typing error; files of a later layout must still open.
 #[test]
 fn keys_that_nobody_knows_are_told_once_each() {
     let bench = Bench::good();
@@ -190,7 +190,7 @@ fn a_reference_distance_that_the_plane_contradicts() {
     assert!(page.contains("+100.0 (!)") && page.contains("−2.0"), "in the table of views");
 }
 
-/// The file was there when the recording was opened; its hash cannot be that of nothing.
+/// The file existed when the recording was opened; hashing must not skip it silently.
 #[test]
 fn a_description_that_is_gone_when_it_is_hashed() {
     let bench = Bench::good();

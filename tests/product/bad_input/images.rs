@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Every way of spoiling a depth image, and what the message must say.
+/// Damaged depth images, each with what the message must contain.
 fn spoiled_images() -> Vec<(Vec<u8>, &'static str)> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("x.png");
@@ -30,7 +30,7 @@ fn spoiled_images() -> Vec<(Vec<u8>, &'static str)> {
     ]
 }
 
-/// A PNG header with a right checksum over a size that fits no memory.
+/// A PNG header with a correct checksum and a size that fits no memory.
 fn png_claiming(width: u32, height: u32) -> Vec<u8> {
     let mut header = b"IHDR".to_vec();
     header.extend(width.to_be_bytes());
@@ -53,7 +53,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 
 #[test]
 fn one_spoiled_frame_is_told_and_its_view_stays() {
-    // Eleven kinds of damage, four views at a time: the list of notes is cut after eight.
+    // Four views at a time, so that the list of notes is not cut.
     for few in spoiled_images().chunks(4) {
         let bench = Bench::good();
         for (view, (bytes, _)) in few.iter().enumerate() {
@@ -110,7 +110,7 @@ fn a_frame_or_a_view_without_any_depth() {
 #[test]
 fn a_view_without_a_plane() {
     let bench = Bench::good();
-    // Words from a multiplicative generator: depths of 0.4 to 4 m without any order.
+    // A linear congruential generator: random depths of 0.4 to 4 m.
     let mut state = 1u32;
     let mut noise = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -127,12 +127,12 @@ fn a_view_without_a_plane() {
     let result =
         bench.calibrate().tells(&["view 0004 was left out", "view 0007 was left out", "view.json"]);
     assert_eq!(used(&result), common::GOOD_VIEWS - 2);
-    // Saying where the target is does not make it one.
+    // A region of interest does not turn it into a plane.
     bench.put("0004/view.json", "{\"roi\": [40, 30, 120, 90]}");
     bench.calibrate().tells(&["view 0004 was left out", "view 0007 was left out"]);
 }
 
-/// A ball of 0.3 m radius whose middle is 1.2 m away.
+/// Depth image of a ball of 0.3 m radius whose centre is 1.2 m away.
 fn sphere() -> Vec<u16> {
     let (distance, radius) = (1.2f64, 0.3);
     (0..160 * 120)

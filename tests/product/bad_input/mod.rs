@@ -1,5 +1,5 @@
-//! Bad input, through the real program: one message and exit code 2, or the exclusion told and
-//! the rest used. Never a panic, never a number that is none, never half a result.
+//! Bad input to the real program: either one message and exit code 2, or a reported exclusion and the rest
+//! used. Never a panic, a NaN or infinity in the results, or half a result.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ mod options;
 mod tables;
 mod views;
 
-/// A copy of the good recording (or anything else) to spoil, and where the results go.
+/// A copy of the good recording (or other input) to damage, and the output folder.
 struct Bench {
     folder: tempfile::TempDir,
     recording: PathBuf,
@@ -37,7 +37,7 @@ impl Bench {
         bench
     }
 
-    /// A good recording of other poses.
+    /// A good recording of the given poses.
     fn of(distances_m: &[f64], tilts_deg: &[f64]) -> Self {
         let bench = Bench::empty();
         shots(grid(distances_m, tilts_deg), 2, 3)
@@ -58,7 +58,7 @@ impl Bench {
         self.folder.path().join("out")
     }
 
-    /// Change the text of a file of the recording.
+    /// Changes the text of a file of the recording.
     fn edit(&self, name: &str, change: impl Fn(&str) -> String) -> &Self {
         let path = self.file(name);
         let text = fs::read_to_string(&path).expect("text");
@@ -83,7 +83,7 @@ impl Bench {
         self.run("calibrate", &self.recording(), options)
     }
 
-    /// `calibrate` does the same with a table.
+    /// Runs `fit`, and asserts that `calibrate` does the same with a table.
     fn fit(&self, table: &str) -> Run {
         let path = self.folder.path().join("table.csv");
         fs::write(&path, table).expect("written");
@@ -125,7 +125,7 @@ struct Run {
 }
 
 impl Run {
-    /// Exit code 2, one message that says all of `needles` and what to do, no model.
+    /// Asserts exit code 2, a single message with all `needles` and a remedy, and no model.
     #[track_caller]
     fn fails(&self, needles: &[&str]) {
         assert_eq!(self.code, Some(2), "{}", self.stderr);
@@ -145,7 +145,7 @@ impl Run {
         self.is_sound();
     }
 
-    /// Exit code 0, JSON on stdout, and all of `needles` told on stderr.
+    /// Asserts exit code 0, JSON on stdout, and all `needles` on stderr.
     #[track_caller]
     fn tells(&self, needles: &[&str]) -> serde_json::Value {
         assert_eq!(self.code, Some(0), "{}", self.stderr);
@@ -157,7 +157,7 @@ impl Run {
         serde_json::from_str(&self.stdout).expect("stdout is JSON")
     }
 
-    /// Either of the two, as the data decide.
+    /// Asserts either a success with all `needles` or a clean failure.
     #[track_caller]
     fn fails_or_tells(&self, needles: &[&str]) {
         if self.code == Some(0) {

@@ -1,8 +1,8 @@
-//! Options, and where results go.
+//! Options and output folders.
 
 use super::*;
 
-/// The good recording's images without their description.
+/// The good recording's images without the description.
 fn plain_folder() -> Bench {
     let bench = Bench::empty();
     for view in 0..common::GOOD_VIEWS {
@@ -105,7 +105,7 @@ fn no_command_and_a_wrong_one() {
     }
 }
 
-/// Permission bits do not stop root; a path below a regular file stops everyone.
+/// Permission bits do not stop root; a path below a regular file fails for every user.
 #[test]
 fn a_folder_that_cannot_be_written() {
     let bench = Bench::good();

@@ -57,7 +57,7 @@ fn tables_that_are_no_tables() {
     bench.run("fit", bench.folder.path(), &[]).fails(&[]);
 }
 
-/// Extreme but legal numbers: a model or a refusal, never a number that is none.
+/// Extreme but legal numbers: a model or a refusal, never NaN or infinity.
 #[test]
 fn tables_of_extreme_numbers() {
     for table in [

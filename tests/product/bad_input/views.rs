@@ -1,4 +1,4 @@
-//! `depth.txt`, `view.json`, and views that are too few or too alike.
+//! `depth.txt`, `view.json`, and too few or too uniform views.
 
 use super::*;
 
@@ -135,7 +135,7 @@ fn a_region_that_holds_nothing() {
     bench.calibrate().tells(&[]);
 }
 
-/// A broken view among many oddities must not be the one that is cut off the list.
+/// A broken view among many smaller notes must not be cut off the list.
 #[test]
 fn a_view_left_out_is_told_before_smaller_oddities() {
     let bench = Bench::good();
@@ -157,7 +157,7 @@ fn too_few_or_too_uniform_views() {
         .fails(&["1 different distance", "other distances"]);
 }
 
-/// When no model can be made, the reasons why views fell out are what the user needs.
+/// When no model can be fitted, the user needs the reasons for the excluded views.
 #[test]
 fn exclusions_are_told_when_the_fit_fails_too() {
     let bench = Bench::of(&[1.0, 1.5, 2.0, 2.5], &[0.0]);

@@ -1,4 +1,4 @@
-//! Films, dumps and folders.
+//! Films, dumps and plain folders.
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn a_film_keeps_its_colour_and_every_frame() {
     let changed: Vec<_> = old.iter().zip(&new).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
     assert_eq!(old.len(), new.len());
     assert_eq!(changed.len(), 4, "the depth images and nothing else: {changed:?}");
-    // The shape that the film was shot with is out again: a film without it is the same but for rounding.
+    // The film's effect is removed: a film without it differs only by rounding.
     files.model(&small(Vec::new()));
     let plain = files.at("plain");
     let shot = kinoise()
@@ -35,7 +35,7 @@ fn a_film_keeps_its_colour_and_every_frame() {
     for name in &changed {
         let a = source.read(&plain.join(name)).expect("read");
         let b = source.read(&files.at("out").join(name)).expect("read");
-        // A word of 0.2 mm each way, and as much again from the rounding of the shifted depth.
+        // A word of 0.2 mm either way, and as much again from rounding the shifted depth.
         off += a.raw.iter().zip(&b.raw).filter(|(a, b)| a.abs_diff(**b) > 3).count();
     }
     assert!(off < 200, "{off} pixels are elsewhere");
@@ -70,8 +70,8 @@ fn a_dump_of_raw_words_goes_on_as_a_described_sequence() {
     assert!(files.at("out/INDEX.txt").is_file());
 }
 
-/// A plain folder has no place for what its raw values mean, until it is written again: then the next
-/// command reads it without an option.
+/// A plain folder cannot store what its raw values mean. Its corrected copy can: the next command reads it
+/// without options.
 #[test]
 fn a_plain_folder_goes_on_as_a_described_one() {
     let files = Files::new();
@@ -103,13 +103,14 @@ fn a_plain_folder_goes_on_as_a_described_one() {
     assert_eq!(names, before.views.iter().map(|v| v.name.clone()).collect::<Vec<_>>());
     let refused = kinoise::io::open(&out, &assumed).expect_err("it describes itself");
     assert!(refused.to_string().contains("describes its sensor itself"), "{refused}");
-    // Once more, in a code that stays as it is.
+    // Once more, now with a code that stays the same.
     fs::rename(&out, files.at("once")).expect("moved");
     files.correct(&files.at("once"), &[]);
     assert!(kinoise::io::open(&out, &Assumed::default()).is_ok());
 }
 
-/// 1/z - 4 px of disparity leave nothing behind 2.7 m: the code's end, and told.
+/// A shift by 6.9 px of disparity leaves no depth beyond 1.6 m: such pixels are clamped to the code's end,
+/// and reported.
 #[test]
 fn depths_beyond_the_code_stand_at_its_end() {
     let files = Files::new();
@@ -120,8 +121,8 @@ fn depths_beyond_the_code_stand_at_its_end() {
     assert!(said.contains("beyond the range of the depth code"), "{said}");
 }
 
-/// Learnt at 3 to 4 px, 2.7 to 3.6 m, and met by views that are nearer: each is corrected as the
-/// nearest that was learnt, and the share of them is told.
+/// Learnt at 3 to 4 px, 2.7 to 3.6 m, and applied to nearer views: these are corrected like the nearest
+/// learnt distance, and their share is reported.
 #[test]
 fn a_shape_is_held_where_its_learning_ended_and_that_is_told() {
     let files = Files::new();
@@ -138,7 +139,7 @@ fn a_shape_is_held_where_its_learning_ended_and_that_is_told() {
     let (json, said) = files.correct(&recording, &[]);
     assert!(json["pixels_changed"].as_u64() > Some(100_000), "{json}");
     assert!(!said.contains("held at the edge"), "{said}");
-    // Nearer than 2.6 m all is held; what stands still is added up in single precision.
+    // Nearer than 2.6 m all is held; one word of tolerance, as constant terms are summed in single precision.
     let (other, near) = (raw_values(&files.at("out")), 13_000);
     let pairs = held.iter().zip(&other).filter(|(a, _)| **a < near);
     assert!(held.len() == other.len() && pairs.clone().count() > 100_000);

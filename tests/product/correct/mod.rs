@@ -1,4 +1,4 @@
-//! Shapes in and biases out: the simulator against closed forms, the correction against noise.
+//! Shapes applied and biases removed: the simulator against closed forms, the correction against noise.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,13 +24,13 @@ mod recordings;
 mod refusals;
 mod shapes;
 
-/// Pixels of half the size each way, words of 0.07 mm.
+/// Half the resolution of a Kinect v1, words of 0.07 mm.
 fn sensor() -> Sensor {
     let code = DepthCode::Metric { units_per_metre: 15_000.0, invalid: 0 };
     Sensor { code, ..kinect_v1(2) }
 }
 
-/// fx * baseline of it, px m.
+/// fx * baseline of this sensor, px m.
 const FB: f64 = 290.0 * 0.075;
 
 fn model(sensor: &Sensor, effects: Vec<Effect>) -> NoiseModel {
@@ -61,7 +61,7 @@ fn bias(basis: Basis, coefficients: &[f64]) -> Term {
     term(Statistic::Bias, basis, coefficients)
 }
 
-/// Frames of a wall through a sensor without noise, or with it.
+/// Frames of a wall by a sensor with this noise, one for each session time.
 fn shots(plane: Plane, effects: &[Effect], sigma_m: f64, sessions: &[f64]) -> Vec<Frame> {
     shots_of(&Bench::bare(plane, Target::Wall), effects, sigma_m, sessions)
 }
@@ -97,7 +97,7 @@ fn depths(frame: &Frame) -> Vec<f32> {
     frame.raw.iter().map(|&w| table.metres(w)).collect()
 }
 
-/// Disparity minus the plane's, px, of every pixel.
+/// Disparity minus that of the plane, px, at every pixel.
 fn residuals(depth: &[f32], plane: &Plane) -> Vec<f64> {
     let rays = sensor().camera.rays();
     let of = |(i, &z): (usize, &f32)| {
@@ -111,12 +111,12 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Half a word's step at a depth, px, and single precision.
+/// Rounding of half a word at this depth, px, plus that of single precision.
 fn rounding_px(z: f64) -> f64 {
     0.6 / 15_000.0 * FB / (z * z) + 1e-4
 }
 
-/// (u, v) of chosen pixels.
+/// (u, v) of the tested pixels.
 const CHOSEN: [(usize, usize); 5] = [(0, 0), (160, 120), (319, 239), (40, 200), (250, 17)];
 
 struct Files {
@@ -139,7 +139,7 @@ impl Files {
         path
     }
 
-    /// A recording of 160 x 120 px with `code`.
+    /// Writes a recording of 160 x 120 px with `code`.
     fn recording(&self, code: DepthCode, effects: Vec<Active>) -> PathBuf {
         let sensor = Sensor { code, ..kinect_v1(4) };
         let grid = common::grid(&[1.0, 1.6], &[0.0, 40.0]);
@@ -192,8 +192,7 @@ fn bowl(k_px: f64) -> Effect {
     shaped("radial-disparity-bias", vec![bowl])
 }
 
-/// Root mean square about the best plane of each view's first frame in units of sigma, by
-/// calibrating.
+/// Mean over the four views of the measured spatial sigma in units of the true one.
 fn sigma_ratio(recording: &Path) -> f64 {
     let opened = kinoise::io::open(recording, &Assumed::default()).expect("opened");
     let measured =
@@ -206,7 +205,7 @@ fn sigma_ratio(recording: &Path) -> f64 {
     assert_eq!(ratios.len(), 4);
     ratios.iter().sum::<f64>() / 4.0
 }
-/// Of every frame of a recording, one after another.
+/// Raw values of all frames of a recording, in order.
 fn raw_values(recording: &Path) -> Vec<u16> {
     let opened = open_uncut(recording, &Assumed::default()).expect("opened");
     let mut source = FrameSource::new(160, 120);

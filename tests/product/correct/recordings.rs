@@ -1,4 +1,4 @@
-//! Whole recordings of views.
+//! Recordings of views.
 
 use super::*;
 
@@ -14,7 +14,7 @@ fn a_corrected_recording_is_back_at_noise_level() {
     assert!((1.0..20.0).contains(&json["rms_shift_mm"].as_f64().expect("a number")), "{json}");
     let (before, after) = (sigma_ratio(&recording), sigma_ratio(&files.at("out")));
     assert!(before > 1.5 && (after - 1.0).abs() < 0.1, "{before} -> {after}");
-    // Everything but depth is there, byte for byte.
+    // All other files are copied byte for byte.
     let (old, new) = (tree(&recording), tree(&files.at("out")));
     assert_eq!(old.len(), new.len());
     for ((name, a), (other, b)) in old.iter().zip(&new) {
@@ -37,7 +37,7 @@ fn a_second_correction_is_told() {
     assert!(said.contains("is corrected already"), "{said}");
 }
 
-/// References give a law its standard error, which is that of the depth: 1 % of it by the scale.
+/// References give the scale a standard error of 1 %, and so the depth.
 #[test]
 fn a_law_has_its_own_uncertainty() {
     let files = Files::new();
@@ -101,7 +101,7 @@ fn raw_disparities_become_fine_metric_words_unless_kept() {
     let text = fs::read_to_string(files.at("out/recording.json")).expect("read");
     let value: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!((&value["owner"], &value["raw_disparity"]), (&json!("lab 3"), &Value::Null));
-    // d = fb / z and 0.2 px less of it.
+    // d = fb / z, less 0.2 px.
     let fb = 145.0 * 0.075;
     let views = |path: &Path| open_uncut(path, &Assumed::default()).expect("opened");
     let (old, new) = (views(&recording), views(&files.at("out")));

@@ -1,4 +1,4 @@
-//! Damaged input, refusals, and the library.
+//! Damaged input, refusals, and the library call.
 
 use super::*;
 
@@ -81,8 +81,8 @@ fn the_library_does_what_the_program_does() {
     assert!(tree(&out) == tree(&files.at("out")));
 }
 
-/// Two shapes of one fit err together and a third for itself: by hand, at every pixel, and in the
-/// images that are written.
+/// Two shapes of one fit have correlated errors, a third is independent: compared with the formula at every
+/// pixel, and in the written images.
 #[test]
 fn the_uncertainty_of_a_correction_is_its_covariance() {
     let grows =

@@ -1,4 +1,4 @@
-//! What single shapes and formulas correct.
+//! Corrections by single shapes and formulas.
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
     let camera = sensor().camera;
     let shape = vec![
         bias(Basis::powers(Coordinate::RadiusSquared, 2, Modulation::power(2.0)), &[0.8, -0.3]),
-        // In fifths of a px.
+        // Coefficients in units of 0.2 px.
         bias(Basis::waves(Coordinate::Column, 40.0, 1), &[1.0, -0.5]),
         bias(
             Basis::powers(
@@ -40,7 +40,7 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
         let bowl = (d / 40.0).powi(2) * (0.8 * r2 - 0.3 * r2 * r2);
         let phase = std::f64::consts::TAU * u as f64 / 40.0;
         let banding = 0.2 * phase.sin() - 0.1 * phase.cos();
-        // k1 of a lens moves a ray by k1 r^2 along the radius: disparity by the plane's gradient.
+        // k1 moves a ray by k1 r^2 along the radius: the disparity changes by the plane's gradient.
         let gradient = FB * (plane.q.x * x + plane.q.y * y);
         let lens = -gradient * (x * x + y * y) * -0.05;
         let knot = z.ln().clamp(0.0, 1.0) * 2.0;
@@ -51,7 +51,7 @@ fn a_shape_is_its_closed_form_at_chosen_pixels() {
     }
 }
 
-/// A bow and a mixed edge belong to the board: the wall behind it has neither.
+/// A bow and edge mixing belong to the board: the wall behind it has neither.
 #[test]
 fn a_boards_shape_stays_on_the_board() {
     let plane = Plane::tilted(1.0, 0.0, 0.0);
@@ -96,7 +96,7 @@ fn a_shape_over_the_session_moves_with_it_and_the_rest_stands() {
     }
 }
 
-/// Standard deviation times exp(value / 2), by depth read-out over many pixels.
+/// A variance term of value v scales the standard deviation by exp(v / 2).
 #[test]
 fn a_variance_shape_scales_the_noise() {
     let plane = Plane::tilted(1.0, 0.0, 0.0);
@@ -108,7 +108,7 @@ fn a_variance_shape_scales_the_noise() {
     assert!((ratio / 0.6f64.exp() - 1.0).abs() < 0.01, "{ratio}");
 }
 
-/// The same effect by formula and by hand-written shape: the same picture.
+/// The same effect by formula and as a hand-written shape gives the same image.
 #[test]
 fn a_bowl_by_shape_is_the_bowl_by_formula() {
     let plane = Plane::tilted(1.5, 0.5, 1.0);
@@ -120,7 +120,7 @@ fn a_bowl_by_shape_is_the_bowl_by_formula() {
     assert!(apart.max().unwrap_or(0) <= 1);
 }
 
-/// Every formula that can be inverted, alone and then all together, with noise.
+/// Every invertible formula, alone and then all together, without noise and with it.
 #[test]
 fn what_a_formula_does_its_correction_undoes() {
     let entries = [
@@ -152,11 +152,12 @@ fn what_a_formula_does_its_correction_undoes() {
     }
     check(&entries, SILENT_M, 0.012);
     let noise = rms(&residuals(&depths(&shots(plane, &[], 0.004, &[0.0])[0]), &plane));
-    // What scales the depth and what locks it change the noise a little with it.
+    // Scaling and locking change the noise a little too.
     check(&entries, 0.004, 1.15 * noise);
 }
 
-/// Each view has its own, and tells it: half a read-out's step of 320 columns, beside as much noise.
+/// Each view has its own steps and they are estimated from it: steps of half a read-out step among 320
+/// columns, beside noise of the same size.
 #[test]
 fn columns_that_step_differently_in_every_view_are_taken_out_of_each() {
     let parameters = json!({"amplitude_px": 0.03125, "period_px": 34.0, "spread": 2.5});
@@ -182,7 +183,7 @@ fn columns_that_step_differently_in_every_view_are_taken_out_of_each() {
     assert!(moved(&clean, &sharp) > 1000);
 }
 
-/// Each kind of sensor bias by hand; the surface it needs is found in the noisy picture.
+/// Each kind of sensor bias by hand; the surface that it needs is estimated from the noisy image.
 #[test]
 fn what_a_shape_does_its_correction_undoes() {
     let (camera, plane) = (sensor().camera, Plane::tilted(1.0, 0.8, -0.7));
@@ -229,12 +230,12 @@ fn what_a_shape_does_its_correction_undoes() {
         correction.apply(&mut depth, &conditions).expect("applied");
         let after = rms(&residuals(&depth, &plane));
         assert!(before > 1.2 * quiet, "{kind:?} did nothing: {before}, noise {quiet}");
-        // A ray length taken for a depth stretches the noise with it, by 9 % here.
+        // A range read as a depth also stretches the noise, by 9 % here.
         assert!(after < 1.10 * quiet, "{kind:?}: {before} -> {after}, noise {quiet}");
     }
 }
 
-/// A board's shape, an edge's mixing and any variance are not the sensor's bias.
+/// A board's shape, edge mixing and any variance are not a bias of the sensor.
 #[test]
 fn what_is_not_the_sensors_bias_stays_in_and_is_told() {
     let across = Basis::Pair {
@@ -261,7 +262,7 @@ fn what_is_not_the_sensors_bias_stays_in_and_is_told() {
     assert_eq!(correction.ignored(), ids);
 }
 
-/// A curve over a temperature that nobody measured is not applied at its cold end.
+/// A curve over an unmeasured temperature is not applied at its cold end.
 #[test]
 fn an_unknown_temperature_changes_nothing() {
     let curve = Basis::Curve {

@@ -1,4 +1,4 @@
-//! Errors that keep their place: in the picture, or on the board.
+//! Biases fixed to the image or to the board.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use super::laboratory::{
     Laboratory, ROUNDING_M, close, column_and_row_means, correlation, line, mean, sd, variance,
 };
 
-/// Sine and cosine parts of `y` at this frequency (cycles per unit of `x`): Lomb's periodogram on
+/// Sine and cosine coefficients of `y` at this frequency (cycles per unit of `x`): Lomb's periodogram, for
 /// samples dense enough to be orthogonal.
 fn wave(x: &[f64], y: &[f64], frequency: f64) -> (f64, f64) {
     let middle = mean(y);
@@ -20,10 +20,10 @@ fn wave(x: &[f64], y: &[f64], frequency: f64) -> (f64, f64) {
     (part(f64::sin), part(f64::cos))
 }
 
-/// The strongest wave lies at one cycle a pixel, 0.1 px high, drawn toward whole pixels.
+/// The strongest wave has one cycle per pixel and 0.1 px amplitude, and pulls towards whole pixels.
 ///
-/// Noise of 0.02 to 0.06 px on 76,800 pixels: standard error of the height 3e-4 px, tolerance 20 of
-/// them; false alarms below 1e-9.
+/// Noise of 0.02 to 0.06 px on 76,800 pixels: standard error of the amplitude 3e-4 px; the tolerance is 20
+/// of them, false alarms below 1e-9.
 #[test]
 fn pixel_locking_is_one_wave_a_pixel() {
     let lab = Laboratory::wall(1.0, 55.0, 0.0).noise(0.001).with("pixel-locking:amplitude_px=0.1");
@@ -43,7 +43,7 @@ fn pixel_locking_is_one_wave_a_pixel() {
     close(cosine, 0.0, 0.006, "the cosine");
 }
 
-/// Column means show a saw-tooth of 8 teeth; row means show nothing.
+/// Column means show a sawtooth of 8 teeth; row means show nothing.
 #[test]
 fn banding_is_vertical_and_periodic() {
     let lab =
@@ -58,7 +58,7 @@ fn banding_is_vertical_and_periodic() {
     });
     let (height, teeth) = strongest.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
     assert_eq!(teeth, 8);
-    // Fourier: the first harmonic of a saw-tooth between -a and a is 2 a / pi.
+    // Fourier: the first harmonic of a sawtooth between -a and a is 2 a / pi.
     close(height, 2.0 * 0.0625 / std::f64::consts::PI, 0.002, "first harmonic, px");
     let jumps = columns.windows(2).filter(|w| (w[1] - w[0]).abs() > 0.06).count();
     assert_eq!(jumps, 8, "edges of a whole step");
@@ -83,7 +83,7 @@ fn the_bowl_is_k_at_the_corner_whatever_the_distance() {
     }
 }
 
-/// Column, from the principal point, at which the error along the middle row turns.
+/// Column, from the principal point, of the extremum of the error along the middle row.
 fn turning_column(lab: &Laboratory, errors: &[f64]) -> f64 {
     let row = 120 * lab.width();
     let points = (row..row + lab.width()).filter(|&i| errors[i].is_finite());
@@ -97,13 +97,13 @@ fn turning_column(lab: &Laboratory, errors: &[f64]) -> f64 {
         )
         .0
     };
-    // The slope of a parabola is linear: where the slopes of the outer thirds cross zero.
+    // The slope of a parabola is linear: it is zero where the line through the outer thirds' slopes is.
     let reach = n as f64 / 3.0;
     middle - reach * (third(2) + third(0)) / (third(2) - third(0))
 }
 
-/// Push the board 0.1 m aside: the bowl's turning point stays in the picture, the bow's goes with
-/// the board, 290 px / 1.5 m * 0.1 m = 19.3 px.
+/// When the board moves 0.1 m sideways, the bowl's extremum stays in the image, the bow's moves with the
+/// board by 290 px / 1.5 m * 0.1 m = 19.3 px.
 #[test]
 fn the_bowl_stays_in_the_picture_and_the_bow_on_the_board() {
     for (effect, moves) in
@@ -120,7 +120,7 @@ fn the_bowl_stays_in_the_picture_and_the_bow_on_the_board() {
     }
 }
 
-/// The bow by formula against rays cast on a bent surface.
+/// The bow by formula agrees with rays cast on a bent surface.
 #[test]
 fn the_bow_is_that_of_a_bent_board() {
     for azimuth in [0.0, 70.0] {
@@ -141,9 +141,9 @@ fn the_bow_is_that_of_a_bent_board() {
     }
 }
 
-/// The same pattern in px at two distances and under another view number; its size.
+/// The pattern in px is the same at two distances and in another view; its size.
 ///
-/// Standard error of a sd over 76,800 pixels: 0.26 %; tolerance 5 of them, false alarms 6e-7.
+/// Standard error of a standard deviation over 76,800 pixels: 0.26 %; tolerance 5 of them, false alarms 6e-7.
 #[test]
 fn the_fixed_pattern_is_the_units_own() {
     let pattern = |z: f64, view| {

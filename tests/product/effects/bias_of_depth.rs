@@ -1,11 +1,11 @@
-//! Errors of the depth itself: rays, scales, offsets, time.
+//! Biases of the depth itself: rays, scales, offsets, time.
 
 use kinoise::Plane;
 use kinoise::effects::Instant;
 
 use super::laboratory::{Laboratory, ROUNDING_M, close, instant, line, mean};
 
-/// Against a camera whose lens model is the library's, not the effect's.
+/// Compared with a camera that uses the library's lens model, not the effect's.
 #[test]
 fn distortion_moves_the_ray() {
     let k1 = -0.08;
@@ -28,7 +28,7 @@ fn distortion_does_not_show_on_a_frontal_plane() {
     assert_eq!(lab.frame(), lab.clone().with("lens-distortion:k1=-0.2").frame());
 }
 
-/// Pythagoras.
+/// The range follows from the depth by Pythagoras.
 #[test]
 fn the_ray_is_longer_than_the_depth() {
     for theta in [0.0, 40.0] {
@@ -44,7 +44,7 @@ fn the_ray_is_longer_than_the_depth() {
     }
 }
 
-/// Bias at four distances, m.
+/// (z, bias) at four distances, m.
 fn biases(effect: &str) -> Vec<(f64, f64)> {
     let bias = |z: f64| {
         let lab = Laboratory::wall(z, 0.0, 0.0).with(effect);
@@ -60,8 +60,8 @@ fn a_wrong_scale_errs_with_z() {
     }
 }
 
-/// First order in the offset the bias is -z^2 offset / (fx b), here 21.75 px m; exactly
-/// 1/z - 1/z' is a constant.
+/// To first order in the offset the bias is -z^2 offset / (fx b), with fx b = 21.75 px m; exactly, 1/z - 1/z'
+/// is constant.
 #[test]
 fn a_wrong_reference_errs_with_z_squared() {
     for (z, bias) in biases("disparity-offset:offset_px=0.1") {
@@ -70,7 +70,7 @@ fn a_wrong_reference_errs_with_z_squared() {
     }
 }
 
-/// What is left to the limit falls as exp(-t / tau): a line in its logarithm.
+/// The remaining drift falls as exp(-t / tau): its logarithm is a line.
 #[test]
 fn warm_up_tends_to_its_limit() {
     let lab =
@@ -88,7 +88,7 @@ fn warm_up_tends_to_its_limit() {
     close(start.exp(), 0.02, 2e-4, "the whole drift, m");
 }
 
-/// Each frame against the plane shifted along the axis.
+/// Each frame is compared with the plane shifted along the axis.
 #[test]
 fn a_moving_target_is_where_it_has_got_to() {
     let lab = Laboratory::wall(1.5, 40.0, 20.0).with("target-motion:velocity_mps=0.03");

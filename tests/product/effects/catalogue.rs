@@ -1,9 +1,9 @@
-//! The catalogue is whole, and says what it should.
+//! Completeness and consistency of the catalogue.
 
 use assert_cmd::Command;
 use kinoise::effects::{Active, CATALOGUE};
 
-/// src/docs/catalogue.md: every id with its parameters.
+/// The ids and parameters of src/docs/catalogue.md.
 const DOCUMENTED: &[(&str, &[&str])] = &[
     ("disparity-quantisation", &["step_px"]),
     ("depth-rounding", &["step_m"]),
@@ -69,7 +69,7 @@ fn the_catalogue_is_the_documented_one_in_its_order() {
     }
 }
 
-/// A file without its word in the list would be dead.
+/// An effect file that is not in the list would be dead code.
 #[test]
 fn every_file_with_an_effect_is_in_the_list() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/effects");

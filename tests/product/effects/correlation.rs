@@ -1,8 +1,8 @@
-//! What errs together: over the picture, over frames, over views.
+//! Correlated noise: over the image, over frames, over views.
 //!
-//! A correlation over n independent pairs has a standard error of 1 / sqrt(n): 0.0036 over a
-//! picture. Tolerances are five standard errors, with fewer effective pairs where noise is
-//! correlated: false alarms 6e-7 a comparison.
+//! A correlation over n independent pairs has a standard error of 1 / sqrt(n): 0.0036 over an image.
+//! Tolerances are five standard errors, with fewer effective pairs where noise is correlated: false alarm
+//! probability 6e-7 per comparison.
 
 use super::laboratory::{
     Laboratory, close, column_and_row_means, correlation, difference, mean, sd, variance,
@@ -14,14 +14,14 @@ fn wall(effect: &str) -> Laboratory {
     Laboratory::wall(1.5, 0.0, 0.0).noise(SIGMA_M).with(effect)
 }
 
-/// The course of a moving mean over 9 px: rho(k) = 1 - k/9, nothing from 9 px on, both ways.
+/// Correlation of a moving mean over 9 px: rho(k) = 1 - k/9 and zero from 9 px on, in both directions.
 ///
-/// 76,800 / 81 = 948 windows a frame, 20 frames: standard error 0.8 %.
+/// 76,800 / 81 = 948 windows per frame, 20 frames: standard error 0.8 %.
 #[test]
 fn neighbours_share_a_window() {
     let lab = wall("spatial-correlation:length_px=9");
     let frames = lab.view(0, 20);
-    // Differences of frames: what stands still cannot feign a window.
+    // Differences of frames: frozen noise cannot mimic a window.
     let moving: Vec<Vec<f64>> =
         frames.chunks(2).map(|pair| difference(&pair[0], &pair[1])).collect();
     for (k, stride) in [1, 3, 6, 9, 14].into_iter().flat_map(|k| [(k, 1), (k, lab.width())]) {
@@ -40,7 +40,7 @@ fn neighbours_share_a_window() {
     close(sd(&all) / SIGMA_M, 1.0, 0.03, "the size of the noise stays");
 }
 
-/// First order: rho(2) = rho(1)^2, rho(3) = rho(1)^3; the size of the noise stays.
+/// First order: rho(2) = rho(1)^2, rho(3) = rho(1)^3; the standard deviation stays the same.
 #[test]
 fn a_filter_over_time_is_an_autoregression() {
     let lab = wall("temporal-correlation:rho=0.6");
@@ -59,7 +59,7 @@ fn a_filter_over_time_is_an_autoregression() {
     close(correlation(&frames[11], &next), 0.0, 0.018, "a new view begins afresh");
 }
 
-/// Half the variance of a difference of frames is the part that moves.
+/// Half the variance of a frame difference is the temporal part.
 #[test]
 fn speckle_stands_still_within_a_view() {
     let lab = wall("frozen-noise:fraction=0.8");
@@ -73,7 +73,7 @@ fn speckle_stands_still_within_a_view() {
     close(correlation(&frames[0], &other), 0.0, 0.018, "another view, another grain");
 }
 
-/// Means of 240 rows: sd known to 4.6 %, over 10 frames to 1.4 %.
+/// Means of 240 rows: standard deviation known to 4.6 %, over 10 frames to 1.4 %.
 #[test]
 fn a_row_moves_as_one() {
     let lab = wall("row-noise:sigma_px=0.05");
@@ -87,12 +87,12 @@ fn a_row_moves_as_one() {
     let all: Vec<f64> = rows.concat();
     let expected = (0.05f64.powi(2) + noise_px * noise_px / 320.0).sqrt();
     close(sd(&all) / expected, 1.0, 0.075, "sd of the rows");
-    // Columns average 240 rows' shifts, the same for all of them: only their own noise differs.
+    // Columns average the shifts of 240 rows, common to all: only their own noise differs.
     close(sd(&columns[0]) / (noise_px / 240f64.sqrt()), 1.0, 0.2, "sd of the columns");
     close(correlation(&rows[0], &rows[1]), 0.0, 0.33, "afresh in each frame");
 }
 
-/// Means of 300 frames: sd known to 4.1 %.
+/// Means of 300 frames: standard deviation known to 4.1 %.
 #[test]
 fn a_frame_moves_as_one() {
     let lab = Laboratory::wall(1.5, 0.0, 0.0).with("frame-jitter:sigma_px=0.05");

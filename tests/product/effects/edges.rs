@@ -1,8 +1,8 @@
-//! What happens where the target ends.
+//! Effects at the edge of the target.
 
 use super::laboratory::{Laboratory, close};
 
-/// Along the board's middle row: columns of its first and last pixel.
+/// First and last column of the board along its middle row.
 fn outline(lab: &Laboratory) -> (usize, usize) {
     let seen = lab.seen();
     let row = 120 * lab.width();
@@ -10,8 +10,7 @@ fn outline(lab: &Laboratory) -> (usize, usize) {
     (board[0], board[board.len() - 1])
 }
 
-/// A square footprint of +-4 px over a step of 1 m: the depth goes straight from one surface to
-/// the other over 8 px.
+/// A square footprint of +-4 px across a step of 1 m: the depth is linear between the surfaces over 8 px.
 #[test]
 fn depth_at_an_edge_is_a_ramp() {
     let lab = Laboratory::board(Some(2.0));
@@ -40,7 +39,7 @@ fn with_nothing_behind_there_is_nothing_to_mix_or_to_shade() {
     }
 }
 
-/// Invalid pixels of a row left and right of the board, and on it.
+/// Invalid pixels of a row left of the board, on it, and right of it.
 fn shadow(lab: &Laboratory) -> [usize; 3] {
     let frame = lab.clone().with("occlusion-shadow").frame();
     let (first, last) = outline(lab);
@@ -49,8 +48,8 @@ fn shadow(lab: &Laboratory) -> [usize; 3] {
     [lost(0, first), lost(first, last + 1), lost(last + 1, lab.width())]
 }
 
-/// Similar triangles: a board at 1 m hides fx b (1 - 1/z) px of a wall at z from a projector that
-/// stands a baseline to the right; the shadow falls to the left.
+/// Similar triangles: a board at 1 m hides fx b (1 - 1/z) px of a wall at z from a projector one baseline to
+/// the right; the shadow is on the left.
 #[test]
 fn the_shadow_has_the_right_width_on_one_side() {
     for wall in [1.5, 2.0, 4.0] {

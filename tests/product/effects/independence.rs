@@ -1,4 +1,4 @@
-//! Effects do not disturb each other: identities, streams, threads.
+//! Effects do not disturb each other: identities, random streams, threads.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use kinoise::simulate::{Physics, Scenery, Shoot, kinect_v1, plan_grid};
 
 use super::laboratory::{Laboratory, difference, instant, sd};
 
-/// A tilted board before a wall: something for every effect to act on.
+/// A tilted board in front of a wall: something for every effect to act on.
 fn stage(effects: Vec<Active>) -> Laboratory {
     let mut lab = Laboratory::wall(1.2, 40.0, 30.0).noise(0.003);
     lab.bench.target = Target::Board(Board { width_m: 0.6, height_m: 0.5 });
@@ -44,8 +44,8 @@ fn an_effect_at_its_identity_is_not_there_among_all_others() {
     }
 }
 
-/// The identity is the limit of the formula, not an exception from it: a ten-millionth of the
-/// range away from it, hardly a word changes, and none by more than one.
+/// The identity is the limit of the formula, not a special case: a ten-millionth of the range away from it,
+/// few words change, and almost none by more than one.
 #[test]
 fn next_to_its_identity_an_effect_does_next_to_nothing() {
     let bare = words(Vec::new());
@@ -69,7 +69,7 @@ fn the_typical_strength_does_something() {
     let bare = words(Vec::new());
     for effect in CATALOGUE {
         let id = effect.card().id;
-        // On this stage nothing is far enough, steep enough, or printed.
+        // In this scene nothing is far enough, steep enough, or moves enough.
         let active = match id {
             "range-dropout" => Active::parse("range-dropout:z50_m=1.2"),
             "grazing-dropout" => Active::parse("grazing-dropout:theta50_deg=35"),
@@ -77,12 +77,12 @@ fn the_typical_strength_does_something() {
             _ => Active::typical(id),
         };
         let same = words(vec![active.unwrap()]) == bare;
-        // White paper is where the intensity does nothing; the wall behind is grey.
+        // White paper does not show the intensity effect; the wall behind is grey.
         assert!(!same, "{id}");
     }
 }
 
-/// With the others' noise of every kind in place, one more effect leaves their numbers alone.
+/// Adding an effect leaves the random numbers of the other kinds of noise unchanged.
 #[test]
 fn adding_an_effect_changes_no_other_stream() {
     let others = [
@@ -119,7 +119,7 @@ fn adding_an_effect_changes_no_other_stream() {
     assert!(off < 1.5e-4, "{off}");
 }
 
-/// The order in which effects are named does not matter: light meets them in its own.
+/// Effects act in the order of light, not in the order of naming.
 #[test]
 fn the_order_of_naming_does_not_matter() {
     let mut all = typical_but("range-dropout");
@@ -141,7 +141,7 @@ fn files(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     found
 }
 
-/// A recording with every effect, written on so many threads: bytes by path.
+/// Files of a recording with these effects, written on this many threads.
 fn recording(threads: usize, effects: &[Active], conditions: bool) -> Vec<(PathBuf, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let board = Target::Board(Board { width_m: 0.6, height_m: 0.5 });
@@ -171,8 +171,8 @@ fn one_thread_and_two_give_the_same_bytes() {
     assert_eq!(recording(1, &all, true), recording(2, &all, true));
 }
 
-/// Everything but the images is the same with all effects on and with none; the light of the room
-/// differs from view to view either way.
+/// Everything but the images is the same with all effects and with none; the room's light differs from view
+/// to view either way.
 #[test]
 fn no_file_tells_what_was_switched_on() {
     let described = |effects: &[Active]| {

@@ -1,4 +1,4 @@
-//! A bench where one thing at a time is switched on.
+//! A simulated bench where effects are switched on one at a time.
 
 use kinoise::effects::{Active, Instant, ROOM_LUX};
 use kinoise::model::Domain;
@@ -8,9 +8,9 @@ use kinoise::{DepthCode, Form, Plane, Seed, Sensor, SigmaModel};
 
 /// Fine enough that the stored word hides nothing: 0.07 mm, up to 4.3 m.
 pub const UNITS_PER_METRE: f64 = 15_000.0;
-/// Farthest a stored depth can lie from what was to be stored, m.
+/// Largest rounding error of a stored depth, m.
 pub const ROUNDING_M: f64 = 0.5 / UNITS_PER_METRE;
-/// The least noise the formula can be asked for: below the stored word.
+/// The least noise that the formula accepts: far below the stored word.
 const SILENT_M: f64 = 1e-9;
 
 #[derive(Clone)]
@@ -24,7 +24,7 @@ pub struct Laboratory {
 }
 
 impl Laboratory {
-    /// A wall with no noise at all, 320 x 240 px.
+    /// A wall without noise, 320 x 240 px.
     pub fn wall(z: f64, theta_deg: f64, azimuth_deg: f64) -> Self {
         let mut sensor = kinect_v1(2);
         sensor.code = DepthCode::Metric { units_per_metre: UNITS_PER_METRE, invalid: 0 };
@@ -33,7 +33,7 @@ impl Laboratory {
         Laboratory { sensor, bench, sigma_m: SILENT_M, effects: Vec::new(), lux: ROOM_LUX, seed: 5 }
     }
 
-    /// A frontal board of 0.5 x 0.4 m at 1 m before a wall at `wall_m`.
+    /// A frontal board of 0.5 x 0.4 m at 1 m in front of a wall at `wall_m`.
     pub fn board(wall_m: Option<f64>) -> Self {
         let mut lab = Laboratory::wall(1.0, 0.0, 0.0);
         lab.bench.target = Target::Board(Board { width_m: 0.5, height_m: 0.4 });
@@ -58,7 +58,7 @@ impl Laboratory {
     pub fn shots(&self, instants: &[Instant]) -> Vec<Shot> {
         let rays = self.sensor.camera.rays();
         let domain = Domain { z_m: [0.1, 20.0], theta_rad: [0.0, 1.45] };
-        // Eq. 1 with everything but its constant switched off; the pole lies beyond the domain.
+        // Eq. 1 with only its constant; the pole lies beyond the domain.
         let flat = [self.sigma_m, 0.0, 0.0, 0.0, 1.0, 1.5];
         let camera = FormulaSensor {
             sensor: &self.sensor,
@@ -80,7 +80,7 @@ impl Laboratory {
         shots.iter().map(|shot| shot.depth.raw.iter().map(metres).collect()).collect()
     }
 
-    /// The first frames of view number `view`, 30 a second.
+    /// The first frames of view number `view`, at 30 Hz.
     pub fn view(&self, view: usize, frames: usize) -> Vec<Vec<f64>> {
         let instants: Vec<Instant> = (0..frames).map(|k| instant(view, k)).collect();
         self.at(&instants)
@@ -90,7 +90,7 @@ impl Laboratory {
         self.view(0, 1).remove(0)
     }
 
-    /// What an undisturbed sensor would measure, m, by the plane's own formula.
+    /// True depths, m, by the plane's own formula.
     pub fn truth(&self) -> Vec<f64> {
         let rays = self.sensor.camera.rays();
         let depth = |i: usize| {
@@ -100,13 +100,13 @@ impl Laboratory {
         (0..rays.x.len()).map(depth).collect()
     }
 
-    /// Measured less true disparity, px, of one frame of a wall.
+    /// Measured minus true disparity, px, of one frame of a wall.
     pub fn disparity_errors(&self, frame: &[f64]) -> Vec<f64> {
         let scale = self.sensor.disparity_px_m().expect("a baseline");
         frame.iter().zip(self.truth()).map(|(z, truth)| scale / z - scale / truth).collect()
     }
 
-    /// Measured less true depth, m, of one frame of a wall.
+    /// Measured minus true depth, m, of one frame of a wall.
     pub fn depth_errors(&self, frame: &[f64]) -> Vec<f64> {
         frame.iter().zip(self.truth()).map(|(z, truth)| z - truth).collect()
     }
@@ -115,14 +115,14 @@ impl Laboratory {
         self.sensor.camera.width
     }
 
-    /// Columns and rows from the principal point, px.
+    /// Offset of pixel `i` from the principal point in columns and rows, px.
     pub fn off_centre(&self, i: usize) -> (f64, f64) {
         let c = &self.sensor.camera;
         ((i % c.width) as f64 - c.cx, (i / c.width) as f64 - c.cy)
     }
 }
 
-/// Frame `k` of a view, 30 a second, the views back to back.
+/// Frame `k` of a view at 30 Hz; views start 30 s apart.
 pub fn instant(view: usize, k: usize) -> Instant {
     let view_s = k as f64 / 30.0;
     Instant { view, frame: k, session_s: view as f64 * 30.0 + view_s, view_s }
@@ -157,7 +157,7 @@ pub fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// Means of the columns of a picture, and of its rows.
+/// Column means and row means of an image.
 pub fn column_and_row_means(picture: &[f64], width: usize) -> (Vec<f64>, Vec<f64>) {
     let rows: Vec<&[f64]> = picture.chunks_exact(width).collect();
     let column = |u: usize| mean(&rows.iter().map(|row| row[u]).collect::<Vec<_>>());

@@ -1,4 +1,4 @@
-//! Pixels without an answer.
+//! Lost pixels.
 
 use super::laboratory::{Laboratory, close, line};
 
@@ -8,7 +8,7 @@ fn lost(lab: &Laboratory) -> f64 {
     frame.iter().filter(|z| z.is_nan()).count() as f64 / frame.len() as f64
 }
 
-/// Half-way point and width of the logistic through shares lost at these places.
+/// Midpoint and width of the logistic through the shares lost at these places.
 ///
 /// A share p of 76,800 pixels gives its log-odds a standard error of 1 / sqrt(n p (1 - p)), at most
 /// 0.012 where p is between 0.1 and 0.9.
@@ -18,7 +18,7 @@ fn logistic_fit(places: &[f64], shares: &[f64]) -> (f64, f64) {
     (-start / slope, 1.0 / slope)
 }
 
-/// Share lost to the effect of what a wall turned about the horizontal shows within range.
+/// Share of the valid pixels, of a wall tilted about the horizontal, that the effect removes.
 fn lost_when_tilted(theta: f64, effect: &str) -> f64 {
     let lab = Laboratory::wall(1.5, theta, 90.0);
     let there = lab.frame().iter().filter(|z| z.is_finite()).count() as f64;
@@ -26,8 +26,8 @@ fn lost_when_tilted(theta: f64, effect: &str) -> f64 {
     1.0 - left / there
 }
 
-/// Half of a steep wall is out of range or behind the camera: 30,000 pixels remain, standard error
-/// of the fit 0.02 degrees; tolerance 5 of them, false alarms 1e-6.
+/// Half of a steep wall is out of range or behind the camera: 30,000 pixels remain, the fit has a standard
+/// error of 0.02 degrees; tolerance 5 of them, false alarms 1e-6.
 #[test]
 fn grazing_angles_are_lost_by_a_logistic() {
     let effect = "grazing-dropout:theta50_deg=70,width_deg=2";
@@ -41,7 +41,7 @@ fn grazing_angles_are_lost_by_a_logistic() {
     close(partly, 0.4, 0.05, "a share beyond the angle");
 }
 
-/// Standard error of the fit 0.4 mm; tolerance 5 of them and more, false alarms 1e-6.
+/// Standard error of the fit 0.4 mm; tolerance over 5 of them, false alarms 1e-6.
 #[test]
 fn the_far_and_the_near_end_are_lost_by_a_logistic() {
     for (effect, sign) in [("z50_m=3,width_m=0.1", 1.0), ("z50_m=3,width_m=-0.1", -1.0)] {
@@ -54,7 +54,7 @@ fn the_far_and_the_near_end_are_lost_by_a_logistic() {
     }
 }
 
-/// Without a width the end is sharp.
+/// With zero width the cut-off is sharp.
 #[test]
 fn a_clip_is_a_clip() {
     let effect = "range-dropout:z50_m=3,width_m=0";

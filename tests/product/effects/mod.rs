@@ -1,8 +1,8 @@
-//! Oracle tests of the physical effects: what each does to depth images, measured by statistics
-//! that know nothing of the effect's own code.
+//! Oracle tests of the physical effects: what each does to depth images, measured by statistics independent
+//! of the effect's code.
 //!
-//! Every random number is seeded, so a test that passes once passes always; the false-alarm
-//! probabilities say how often a correct effect would fail under another seed.
+//! All random numbers are seeded, so the tests are deterministic; the false-alarm probabilities say how often
+//! a correct effect would fail under another seed.
 
 mod bias_in_the_picture;
 mod bias_of_depth;

@@ -1,7 +1,7 @@
-//! How large the noise is, and where.
+//! Size of the noise, and where it is large.
 //!
-//! A standard deviation over n pixels has a relative standard error of 1 / sqrt(2 n): 0.26 % over
-//! a picture of 76,800. Tolerances are five standard errors: false alarms 6e-7 a comparison.
+//! A standard deviation over n pixels has a relative standard error of 1 / sqrt(2 n): 0.26 % over an image of
+//! 76,800. Tolerances are five standard errors: false alarm probability 6e-7 per comparison.
 
 use kinoise::scene::{PATCH_SIDE_M, Print};
 
@@ -10,14 +10,14 @@ use super::laboratory::{Laboratory, close, instant, line, sd};
 const SIGMA_M: f64 = 0.002;
 const WHOLE_PICTURE: f64 = 0.013;
 
-/// Errors over the model's sigma, of the pixels that answer.
+/// Index and error in units of the model's sigma, of each valid pixel.
 fn standardised(lab: &Laboratory) -> Vec<(usize, f64)> {
     let errors = lab.depth_errors(&lab.frame());
     let each = errors.into_iter().enumerate().filter(|(_, e)| e.is_finite());
     each.map(|(i, e)| (i, e / SIGMA_M)).collect()
 }
 
-/// Sd of the errors over sigma after division by what is `expected` of each pixel.
+/// Standard deviation of the standardised errors, divided by `expected` at each pixel.
 fn left_over(lab: &Laboratory, expected: impl Fn(usize) -> f64) -> f64 {
     let errors: Vec<f64> = standardised(lab).iter().map(|&(i, e)| e / expected(i)).collect();
     sd(&errors)
@@ -35,8 +35,8 @@ fn another_power_of_z() {
     }
 }
 
-/// Variances add: the model's, and (0.8 px dz/du)^2: with 290 px, dz/du is z tan(theta) / 290 px on the
-/// optical axis, and goes with z^2 over the plane.
+/// Variances add: the model's and (0.8 px dz/du)^2. With fx = 290 px, dz/du is z tan(theta) / 290 px on the
+/// optical axis, and grows with z^2 over the plane.
 #[test]
 fn a_slope_turns_lateral_noise_into_depth_noise() {
     for theta in [30.0f64, 60.0] {
@@ -45,7 +45,7 @@ fn a_slope_turns_lateral_noise_into_depth_noise() {
         let truth = lab.truth();
         let slope = 0.8 / 290.0 * theta.to_radians().tan() / axis;
         let got = left_over(&lab, |i| 1f64.hypot(slope * truth[i].powi(2) / SIGMA_M));
-        // The far half is out of range at 60 degrees: fewer pixels.
+        // At 60 degrees the far half is out of range: fewer pixels.
         close(got, 1.0, 0.02, "sigma");
     }
 }
@@ -58,7 +58,7 @@ fn a_frontal_plane_has_neither_slope_nor_direction() {
     }
 }
 
-/// At 60 degrees along and across the baseline, either way round.
+/// At 60 degrees along and across the baseline, in both directions.
 #[test]
 fn tilt_along_the_baseline_is_noisier() {
     let at =
@@ -70,7 +70,7 @@ fn tilt_along_the_baseline_is_noisier() {
     close(at(45.0), 1.0, 0.02, "between the two");
 }
 
-/// Four rings of the picture.
+/// Tests four rings of the image.
 #[test]
 fn corners_are_noisier() {
     let lab = noisy(1.5, 0.0, 0.0, "vignetting:growth=0.5");
@@ -92,8 +92,8 @@ fn corners_are_noisier() {
     }
 }
 
-/// On a print of eight greys: sigma over reflectance is a power, in the logarithms a line; the
-/// infrared picture sees the greys too.
+/// On a print of eight greys, sigma is a power of the reflectance: a line in the logarithms. The infrared
+/// image shows the greys too.
 #[test]
 fn dark_patches_are_noisier() {
     let mut lab = noisy(1.5, 0.0, 0.0, "intensity-dependent-noise:exponent=0.5");
@@ -117,8 +117,8 @@ fn dark_patches_are_noisier() {
     close(slope, -0.5, 0.035, "exponent");
 }
 
-/// Shot noise of pattern and room: sigma^2 grows by ambient over pattern, whose light falls with
-/// the square of the range and the cosine.
+/// Shot noise of pattern and room light: sigma^2 grows by ambient over pattern light, and the pattern falls
+/// with the square of the range and the cosine.
 #[test]
 fn room_light_makes_noise_as_it_outshines_the_pattern() {
     for (lux, z) in [(0.0, 2.0), (500.0, 2.0), (500.0, 4.0), (2000.0, 2.0)] {
@@ -130,7 +130,7 @@ fn room_light_makes_noise_as_it_outshines_the_pattern() {
             0.1 * lux / 500.0 * range.powi(3) / z
         };
         close(left_over(&lab, |i| (1.0 + over(i)).sqrt()), 1.0, WHOLE_PICTURE, "sigma");
-        // Pattern 0.8 / z^2 of a white surface, and the room's light on top of it.
+        // Pattern light 0.8 / z^2 from a white surface, plus the room's light.
         let middle = 120 * 320 + 160;
         let light = f64::from(lab.shots(&[instant(0, 0)])[0].light[middle]);
         close(light * z * z / 0.8, 1.0 + over(middle), 0.001, "infrared light");

@@ -1,16 +1,16 @@
-//! A map of depth multipliers over the picture and the distance (Teichman, Miller and Thrun,
-//! "Unsupervised intrinsic calibration of depth sensors via SLAM", RSS 2013).
+//! Map of depth multipliers over the image and the distance (Teichman, Miller and Thrun, "Unsupervised
+//! intrinsic calibration of depth sensors via SLAM", RSS 2013).
 //!
-//! Their map's depth is here that of the plane; a cell's multiplier is fitted to what falls near it,
-//! and read linearly between cells.
+//! Here the plane takes the place of their map's depth. A cell's multiplier is fitted to the measurements
+//! near it and interpolated linearly between cells.
 
 use super::{Learnt, Tiles};
 
-/// Theirs has cells of 8 x 6 px of 640 x 480 and 2 m, and an hour of driving around.
+/// Size of the grid. Theirs has cells of 8 x 6 px of 640 x 480 and 2 m, and an hour of driving around.
 const ACROSS: usize = 17;
 const DOWN: usize = 13;
 const CELL_M: f64 = 0.5;
-/// Measurements of a multiplier of one that a cell starts with.
+/// Prior of each cell: this many measurements of a multiplier of one.
 const CAUTION: f64 = 50.0;
 
 pub fn fit(tiles: &Tiles) -> Learnt {
@@ -18,7 +18,7 @@ pub fn fit(tiles: &Tiles) -> Learnt {
     let [low, high] = kinoise::stats::range(tiles.tiles.iter().map(|t| scale_px_m / t.at[2]));
     let deep = ((high - low) / CELL_M).ceil().max(1.0) as usize + 1;
     let size = [camera.width as f64 - 1.0, camera.height as f64 - 1.0];
-    // The eight cells about a place, and their shares.
+    // The eight cells around a place, with their interpolation weights.
     let about = move |[u, v, disparity]: [f64; 3]| -> [(usize, f64); 8] {
         let node = |share: f64, nodes: usize| {
             let place = share.clamp(0.0, 1.0) * (nodes - 1) as f64;

@@ -1,32 +1,32 @@
-//! A Gaussian process of the bias over the picture and the disparity, with every view's plane free.
-//! Squared exponential, a length for each axis (Rasmussen and Williams 2006, chapter 5): lengths,
-//! size and noise by marginal likelihood.
+//! Gaussian process of the bias over the image and the disparity, with a free plane in every view.
+//! Squared-exponential kernel with one length per axis (Rasmussen and Williams 2006, chapter 5); lengths,
+//! amplitude and noise by marginal likelihood.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::{Learnt, Tile, Tiles};
 
-/// The cost goes with the cube: blocks to settle the hyperparameters with, and blocks to fit.
+/// Number of blocks for choosing the hyperparameters, and for the fit; the cost grows with its cube.
 const SETTLE: usize = 260;
 const FIT: usize = 450;
-/// Factors by which the hyperparameters are tried, a round each.
+/// Factors by which the hyperparameters are varied, one per round.
 const TRIED: [f64; 2] = [2.5, 1.6];
-/// Variance of a plane's coefficients over that of the bias: as good as free.
+/// Prior variance of a plane's coefficients relative to that of the bias: practically free.
 const FREE: f64 = 1e3;
-/// Of the standard error, squared: measurements that are alone in their block.
+/// Lower limit of a block's squared standard error, px^2.
 const MIN_NOISE: f64 = 1e-12;
 
-/// What is regressed.
+/// The regression problem.
 struct Problem {
     at: Vec<[f64; 3]>,
     view: Vec<usize>,
     y: DVector<f64>,
     noise: Vec<f64>,
-    /// Variance of the coefficients of a view's plane over that of the bias.
+    /// Variance of the coefficients of a view's plane relative to that of the bias.
     free: f64,
 }
 
-/// Lengths, standard deviation, and root of the factor on the noise's variance.
+/// Lengths, amplitude (standard deviation), and factor on the noise's standard deviation.
 #[derive(Debug, Clone, Copy)]
 struct Hyper {
     lengths: [f64; 3],
@@ -52,7 +52,8 @@ impl Hyper {
 }
 
 impl Problem {
-    /// A plane is affine in the picture's coordinates, and free in every view.
+    /// Problem of these tiles at their scaled places. A plane is affine in the image coordinates and free
+    /// in every view.
     fn of(tiles: &[Tile], place: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         Problem {
             at: tiles.iter().map(|t| place(t.at)).collect(),
@@ -75,7 +76,7 @@ impl Problem {
         DMatrix::from_fn(n, n, of).cholesky()
     }
 
-    /// Logarithm of the marginal likelihood, but for a constant.
+    /// Log marginal likelihood, up to a constant.
     fn evidence(&self, hyper: &Hyper) -> f64 {
         let Some(whole) = self.covariance(hyper).filter(|_| hyper.is_sound()) else {
             return f64::NEG_INFINITY;
@@ -84,7 +85,7 @@ impl Problem {
         -0.5 * self.y.dot(&whole.solve(&self.y)) - log
     }
 
-    /// By turns, each up and down.
+    /// Coordinate search for the hyperparameters: each in turn, up and down.
     fn settle(&self) -> Hyper {
         let square = self.y.norm_squared() / self.y.len().max(1) as f64;
         let mut best = Hyper { lengths: [0.8; 3], size: square.sqrt().max(1e-6), noise: 1.0 };
@@ -104,7 +105,7 @@ impl Problem {
         best
     }
 
-    /// The posterior mean; zero everywhere where no covariance can be had.
+    /// Posterior mean; zero everywhere if the covariance is not positive definite.
     fn mean(self, hyper: Hyper) -> impl Fn([f64; 3]) -> f64 + Send + Sync {
         let alpha = self.covariance(&hyper).map_or(DVector::zeros(0), |c| c.solve(&self.y));
         move |at| {
@@ -118,7 +119,7 @@ pub fn fit(tiles: &Tiles) -> Learnt {
     let camera = &tiles.sensor.camera;
     let [low, high] = kinoise::stats::range(tiles.tiles.iter().map(|t| t.at[2]));
     let (w, h) = (camera.width as f64 / 2.0, camera.height as f64 / 2.0);
-    // Takes the recording's span to -1 .. 1.
+    // Scales the recording's span to -1 .. 1.
     let (middle, half) = ([w, h, 0.5 * (low + high)], [w, w, (0.5 * (high - low)).max(1e-6)]);
     let place =
         move |at: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| (at[k] - middle[k]) / half[k]) };
@@ -135,7 +136,7 @@ pub fn fit(tiles: &Tiles) -> Learnt {
 mod tests {
     use super::*;
 
-    /// What scikit-learn 1.9.1 says at the two places below.
+    /// Posterior means of scikit-learn 1.9.1 at the two places below.
     const SKLEARN: [f64; 2] = [0.262_165_055_272_696_07, 0.397_313_855_702_698_6];
 
     /// Against scikit-learn: GaussianProcessRegressor(0.49 * RBF([0.5, 1.0, 2.0]),

@@ -1,5 +1,5 @@
-//! What others would do with the same recording: all get the same tiles of the residuals, and learn
-//! the error of the disparity. None of them asks whether there is anything to find, none gives a name.
+//! Baselines: what others would do with the same recording. All get the same tiles of the residuals and
+//! learn the disparity error. None of them asks whether there is anything to find, and none names a cause.
 
 mod clams;
 mod gaussian;
@@ -19,10 +19,9 @@ use crate::gain::Predictor;
 use crate::predictor::{plane_of, scale_px_m};
 use crate::raytraced::question::ExamView;
 
-/// What learns from tiles.
+/// Fits a baseline to tiles.
 type Method = fn(&Tiles) -> Learnt;
 
-/// By name.
 pub const METHODS: [(&str, Method); 2] =
     [("clams-grid", clams::fit), ("gaussian-process", gaussian::fit)];
 
@@ -30,29 +29,29 @@ pub const METHODS: [(&str, Method); 2] =
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tile {
     pub view: usize,
-    /// Place in the picture, px, and the plane's disparity there, px: all that these methods look at.
+    /// Position in the image, px, and the plane's disparity there, px: all that these methods use.
     pub at: [f64; 3],
     /// Mean residual, px of disparity.
     pub mean: f64,
-    /// Model's variance of a pixel in one frame, px^2.
+    /// The model's variance of one pixel in one frame, px^2.
     pub variance: f64,
     /// Measurements: pixels times frames.
     pub count: f64,
 }
 
-/// Of all views that show a plane.
+/// Tiles of all views that show a plane.
 pub struct Tiles {
     pub sensor: Sensor,
     pub scale_px_m: f64,
     pub tiles: Vec<Tile>,
 }
 
-/// Tiles across the picture, 2 px of 160 to 8 px of 640: over a steep and near target the disparity
-/// changes by a pixel in ten, and a ripple must not be smeared.
+/// Tiles across the image, 2 px of 160 to 8 px of 640. On a steep, near target the disparity changes by a
+/// pixel in ten, and a ripple must not be smeared.
 const ACROSS: usize = 80;
 
 impl Tiles {
-    /// Of `recording/` in a folder, weighed by `model`, its effects taken out.
+    /// Tiles of `recording/` in a folder, weighted by `model`, with its effects removed.
     pub fn of_folder(folder: &Path, model: &NoiseModel) -> Result<Self> {
         let recording = open(&folder.join("recording"), &Assumed::default())?;
         let sensor = recording.sensor.clone();
@@ -90,7 +89,7 @@ impl Tiles {
         Ok(Tiles { sensor, scale_px_m, tiles })
     }
 
-    /// Fewer and larger, in blocks as small as their number, at most `max`, allows.
+    /// Merges the tiles into blocks, as small as possible with at most `max` of them.
     fn blocks(&self, max: usize) -> Vec<Tile> {
         let camera = &self.sensor.camera;
         let of = |across: usize| {
@@ -106,7 +105,7 @@ impl Tiles {
     }
 }
 
-/// Tiles of the same key as one, weighed by their measurements.
+/// Merges tiles of the same key, weighted by their measurements.
 fn merged(tiles: impl Iterator<Item = ([usize; 2], Tile)>) -> Vec<Tile> {
     let mut sums: BTreeMap<[usize; 2], Tile> = BTreeMap::new();
     for (key, t) in tiles {
@@ -125,11 +124,11 @@ fn merged(tiles: impl Iterator<Item = ([usize; 2], Tile)>) -> Vec<Tile> {
     sums.into_values().map(mean).collect()
 }
 
-/// Error of the disparity, px, at a place: u and v, px, and the disparity, px.
+/// Learnt disparity error, px, as a function of u and v, px, and the disparity, px.
 pub struct Learnt {
     scale_px_m: f64,
     bias: Box<dyn Fn([f64; 3]) -> f64 + Send + Sync>,
-    /// Evaluated at every so many pixels each way, and held between.
+    /// Evaluated every so many pixels in both directions and constant in between.
     stride: usize,
 }
 

@@ -11,15 +11,15 @@ use crate::raytraced::question::Truth;
 pub struct AdviceMarks {
     /// The two names in doubt, the better first.
     pub doubt: Vec<String>,
-    /// What leads the finding of the same statistic with the view.
+    /// Leading name of the finding of the same statistic after the view, or "nothing".
     pub after: String,
-    /// Probability of the hidden name among the two, before and after; none where neither is hidden.
+    /// Probability of the hidden name among the two, before and after; `None` where neither is hidden.
     pub right: Option<[f64; 2]>,
-    /// Afterwards the hidden name leads with 0.9 or more.
+    /// Whether the hidden name leads afterwards with 0.9 or more.
     pub settled: Option<bool>,
 }
 
-/// Judge one set's second verdict beside its first.
+/// Judges one set's second verdict against its first.
 pub fn mark_advice(truth: &Truth, first: Option<&Value>, second: Option<&Value>) -> AdviceMarks {
     let read = |v: Option<&Value>| v.and_then(|v| Verdict::read(v).ok());
     let (before, after) = (read(first), read(second).unwrap_or_default());

@@ -1,4 +1,4 @@
-//! The five figures that were chosen beforehand, and whether they reach their marks.
+//! The five endpoints chosen in advance, and whether they reach their marks.
 
 use kinoise::Seed;
 use kinoise::stats::{at_least, at_most, quantile};
@@ -10,7 +10,7 @@ use crate::gain::OUR_METHOD;
 use crate::proof::ProvenSet;
 use crate::raytraced::question::{Cell, World};
 
-/// How far a figure got.
+/// Best mark that an endpoint reaches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
@@ -19,7 +19,7 @@ pub enum Level {
     Extraordinary,
 }
 
-/// One of the five.
+/// Result of one endpoint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Endpoint {
     pub id: String,
@@ -27,14 +27,14 @@ pub struct Endpoint {
     pub n: usize,
     /// The figure itself; `None` where nothing was measured.
     pub value: Option<f64>,
-    /// 95 %.
+    /// 95 % confidence interval.
     pub interval: Option<[f64; 2]>,
-    /// What "good" and "extraordinary" ask for.
+    /// Values required for "good" and "extraordinary".
     pub marks: [f64; 2],
-    /// The best mark that the figure reaches as it stands.
+    /// The best mark that the value itself reaches, whatever its interval.
     pub reached: Level,
-    /// Probability of such a figure or a better one if the truth only just missed the mark; after
-    /// Holm over the five. For "good" and for "extraordinary".
+    /// p-values for "good" and "extraordinary" against a truth that only just misses the mark, Holm-adjusted
+    /// over the five endpoints.
     pub p_adjusted: [f64; 2],
 }
 
@@ -46,11 +46,11 @@ struct Question {
 }
 
 enum Measure {
-    /// Of the sets that a question is put to, how many are answered with yes.
+    /// Share of the sets asked a question that are answered with yes.
     Share(&'static str, fn(&ProvenSet) -> bool),
-    /// The same, the fewer the better.
+    /// The same; lower is better.
     Alarms(&'static str),
-    /// Of our gain over the oracle's, on one of [`SIDES`].
+    /// Median of our gain over the oracle's, on one of [`SIDES`].
     Gain(usize),
 }
 
@@ -107,7 +107,7 @@ const QUESTIONS: [Question; 5] = [
     },
 ];
 
-/// As they are committed to.
+/// The endpoints in words, as they are committed to.
 pub fn endpoints_in_words() -> Vec<String> {
     QUESTIONS.iter().map(|q| q.words.to_string()).collect()
 }
@@ -138,7 +138,7 @@ impl Question {
         }
     }
 
-    /// Exact binomial.
+    /// Endpoint of a share, with exact binomial p-values.
     fn share(&self, answers: &[bool], fewer: bool) -> Endpoint {
         let Some(Rate { k, n, rate, interval }) = Rate::of(answers.iter().copied()) else {
             return self.figure(0, None, |_| false, |_| 1.0);
@@ -148,7 +148,7 @@ impl Question {
         self.figure(n, Some((rate, interval)), reaches, p)
     }
 
-    /// Sign test against each mark; the interval by resampling sets.
+    /// Endpoint of a median: sign test against each mark; interval by bootstrap over sets.
     fn median(&self, ratios: &[f64]) -> Endpoint {
         let n = ratios.len();
         let value = quantile(&mut ratios.to_vec(), 0.5).zip(resampled_median(ratios));

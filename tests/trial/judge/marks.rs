@@ -1,4 +1,4 @@
-//! One set against its answer, question by question.
+//! One set's answer compared with its truth, question by question.
 
 use std::collections::BTreeMap;
 
@@ -9,15 +9,14 @@ use serde_json::Value;
 use super::verdict::{Finding, Verdict};
 use crate::raytraced::question::{Cell, Hidden, Truth};
 
-/// What the judge says of one set.
+/// Marks of one set.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Marks {
-    /// The first thing said: a name, "unexplained", "recalibrate", "nothing", or "failed".
+    /// What the first finding says: a name, "unexplained", "recalibrate", "nothing", or "failed".
     pub first: String,
-    /// Every one of [`QUESTIONS`] that arose, and whether the answer is yes. Without a diagnosis
-    /// everything that was asked is wrong.
+    /// Answers to those of [`QUESTIONS`] that apply. Without a diagnosis every answer counts as wrong.
     pub answers: BTreeMap<String, bool>,
-    /// What the stretch of the finding and that of the label share, over what either holds.
+    /// Intersection over union of the finding's interval and the label's.
     pub overlap: Option<f64>,
     pub parameters: Vec<ParameterMark>,
     pub stated: Vec<Stated>,
@@ -32,7 +31,7 @@ pub struct ParameterMark {
     pub said: f64,
     /// |said - truth| / |truth|.
     pub relative_error: f64,
-    /// The 90 % interval of the stated standard error holds the truth.
+    /// Whether the 90 % interval of the stated standard error holds the truth.
     pub covered: Option<bool>,
 }
 
@@ -44,7 +43,7 @@ pub struct Stated {
     pub right: bool,
 }
 
-/// By name: what is asked of which sets, in words; and the answer, none where it is not asked.
+/// Name, what is asked of which sets, and the answer; `None` where it is not asked.
 type Question = (&'static str, &'static str, fn(&Case<'_>) -> Option<bool>);
 
 pub const QUESTIONS: [Question; 14] = [
@@ -116,7 +115,7 @@ pub const QUESTIONS: [Question; 14] = [
     }),
 ];
 
-/// Judge one set.
+/// Judges one set.
 ///
 /// # Errors
 /// When the verdict is not a diagnosis.
@@ -135,14 +134,14 @@ pub fn mark(truth: &Truth, verdict: Option<&Value>) -> Result<Marks> {
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Empty,
-    /// Sigma itself.
+    /// Sigma itself has changed.
     Drift,
     /// What planes cannot show.
     Blind,
     Concealed,
 }
 
-/// What is hidden and what was said to it; nothing where no diagnosis came.
+/// What is hidden and what was said; `said` is `None` where no diagnosis came.
 pub struct Case<'a> {
     kind: Kind,
     hidden: &'a [Hidden],
@@ -178,12 +177,12 @@ impl Case<'_> {
         self.said.is_some_and(Verdict::finds_something)
     }
 
-    /// The most important finding, where there is a mismatch at all.
+    /// The most important finding, if the verdict is a mismatch.
     fn first(&self) -> Option<&Finding> {
         self.claims().next().filter(|_| self.found())
     }
 
-    /// Asked of the first finding, where something with a name is hidden.
+    /// Answer about the first finding; asked only where something with a name is hidden.
     fn of_first(&self, ask: impl Fn(&Finding) -> bool) -> Option<bool> {
         let asked = self.is(Kind::Concealed) && self.hidden.iter().any(|h| !h.names.is_empty());
         self.first().filter(|_| asked).map(ask)
@@ -204,7 +203,7 @@ impl Case<'_> {
         self.hidden.iter().filter(move |h| id.as_ref().is_none_or(|id| h.names.contains(id)))
     }
 
-    /// Of the finding that meets a label with a stretch best.
+    /// Best overlap of a finding with a label that it fits.
     fn best_overlap(&self) -> Option<f64> {
         let fits = |f: &Finding, h: &Hidden| match f.name() {
             Some(id) => h.names.iter().any(|n| n == id),
@@ -237,7 +236,7 @@ impl Case<'_> {
     }
 }
 
-/// Standard deviations of a Gaussian that hold 90 %.
+/// Half-width of the central 90 % of a Gaussian, in standard deviations.
 const NINETY_PERCENT: f64 = 1.644_853_626_951_472_2;
 
 fn parameter(effect: &str, name: &str, truth: f64, estimate: &Value) -> Option<ParameterMark> {
@@ -282,7 +281,7 @@ pub mod tests {
         json!({"verdict": verdict, "findings": findings, "after": {"verdict": "match"}})
     }
 
-    /// Names said, against what is hidden: the questions that are answered with yes.
+    /// What is hidden, what is said, and the questions answered with yes.
     #[test]
     fn right_and_wrong_names_and_silence_count_as_what_they_are() {
         let vignetting = || truth("single", json!([hidden(&["vignetting"], "radius")]));

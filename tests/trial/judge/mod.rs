@@ -1,5 +1,5 @@
-//! What was right and what was wrong: [`mark`] judges one set, [`scores`] all of them, and the five
-//! endpoints say how far the figures that were chosen beforehand got.
+//! Judges the answers: [`mark`] one set, [`scores`] all of them; the five endpoints compare the figures
+//! chosen in advance with their marks.
 
 mod advice;
 mod endpoints;

@@ -1,4 +1,4 @@
-//! All sets together: rates with their intervals, by every grouping that is asked for.
+//! Scores over all sets: rates with their intervals, in several groupings.
 
 use std::collections::BTreeMap;
 
@@ -11,18 +11,18 @@ use crate::gain::{Gain, Gains};
 use crate::proof::ProvenSet;
 use crate::raytraced::question::{Cell, Hidden, Truth};
 
-/// So many of so many.
+/// A rate, `k` of `n`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
     pub k: usize,
     pub n: usize,
     pub rate: f64,
-    /// 95 %, Clopper and Pearson.
+    /// 95 % interval of Clopper and Pearson.
     pub interval: [f64; 2],
 }
 
 impl Rate {
-    /// `None` where nothing was tried.
+    /// Share of yes; `None` without answers.
     pub fn of(answers: impl Iterator<Item = bool>) -> Option<Self> {
         let (k, n) = answers.fold((0, 0), |(k, n), yes| (k + usize::from(yes), n + 1));
         let interval = clopper_pearson(k, n, 0.95);
@@ -32,32 +32,32 @@ impl Rate {
 
 /// Rates by question.
 pub type Rates = BTreeMap<String, Rate>;
-/// By a name, and by strength.
+/// Rates by name, then by strength.
 pub type ByStrength = BTreeMap<String, BTreeMap<String, Rates>>;
 
-/// The whole trial.
+/// Scores of a whole trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     pub sets: usize,
-    /// By kind of set, "WORLD/CELL"; what the catalogue has no name for is "WORLD/nameless".
+    /// By kind of set, "WORLD/CELL"; single causes without a name in the catalogue are "WORLD/nameless".
     pub by_kind: BTreeMap<String, Rates>,
-    /// Single causes by kind and strength, nats (in the world of light the size that was ordered).
+    /// Single causes by kind and strength, nats (in the light world the size that was ordered).
     pub by_strength: ByStrength,
     /// Single causes by name and strength; those outside the catalogue by form.
     pub by_effect: ByStrength,
-    /// Of single causes that were detected: what was hidden, what was said first, how often.
+    /// Detected single causes: what was hidden, what was said first, how often.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
-    /// Medians over all sets.
+    /// Medians over all overlaps and all parameters.
     pub overlap: Option<f64>,
     pub parameter_error: Option<f64>,
     /// Stated 90 % intervals that hold the truth.
     pub coverage: Option<Rate>,
     /// Stated probabilities of best names against how often they are right.
     pub calibration: Vec<Bin>,
-    /// Mean distance of the two over the bins, and Brier's score.
+    /// Expected calibration error over the bins, and the Brier score.
     pub calibration_error: Option<f64>,
     pub brier: Option<f64>,
-    /// Gains over the oracle's, by method, inside and outside the recording's distances and tilts.
+    /// Ratios to the oracle's gain by method, inside and outside the recording's distances and tilts.
     pub gains: BTreeMap<String, [Option<Ratio>; 2]>,
     /// Advised views after which the hidden name leads with 0.9 or more.
     pub advice: Option<Rate>,
@@ -72,7 +72,7 @@ pub struct Bin {
     pub right: Rate,
 }
 
-/// Gains of one method over the oracle's, over sets.
+/// One method's gains as ratios to the oracle's, over sets.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
     /// Sets whose oracle gains something.
@@ -82,7 +82,6 @@ pub struct Ratio {
     pub low: f64,
 }
 
-/// Score all sets.
 pub fn scores(sets: &[ProvenSet]) -> Scores {
     let all: Vec<&ProvenSet> = sets.iter().collect();
     let mut singles = all.clone();
@@ -112,11 +111,11 @@ pub fn scores(sets: &[ProvenSet]) -> Scores {
     }
 }
 
-/// Strengths as they are ordered, nats.
+/// Strengths that can be ordered, nats.
 const LEVELS: [f64; 6] = [5.0, 15.0, 50.0, 150.0, 500.0, 5000.0];
 
-/// What the weakest hidden cause is worth, as the nearest of the strengths that are ordered; what
-/// its world says it reached, else what was ordered.
+/// Worth of the weakest hidden cause, as the nearest of the strengths that can be ordered; by what its world
+/// says it reached, otherwise by what was ordered.
 pub fn level(truth: &Truth) -> Option<f64> {
     let nats = truth.hidden.iter().filter_map(|h| h.nats.or(truth.asked.nats));
     let min = nats.reduce(f64::min).filter(|n| *n > 0.0)?;
@@ -124,13 +123,13 @@ pub fn level(truth: &Truth) -> Option<f64> {
     LEVELS.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
-/// As in the files.
+/// Name of a variant as in the files.
 pub fn word(of: impl Serialize) -> String {
     serde_json::to_value(of).ok().and_then(|v| v.as_str().map(String::from)).unwrap_or_default()
 }
 
-/// A switch of the world of light that has no name in the catalogue stands apart: its name cannot be
-/// right.
+/// Kind of a set. Switches of the light world that have no name in the catalogue are kept apart: no name
+/// said of them can be right.
 fn kind(truth: &Truth) -> String {
     let (world, cell) = (word(truth.asked.world), truth.asked.cell);
     let nameless = truth.hidden.iter().all(|h| h.names.is_empty());
@@ -144,7 +143,7 @@ fn hidden_name(truth: &Truth) -> String {
     truth.hidden.iter().map(Hidden::name).collect::<Vec<_>>().join("+")
 }
 
-/// What `of` makes of all sets that have a key in common.
+/// Applies `of` to each group of sets that share a key.
 fn grouped<T>(
     sets: &[&ProvenSet],
     key: impl Fn(&ProvenSet) -> Option<String>,
@@ -181,7 +180,7 @@ fn confusion(singles: &[&ProvenSet]) -> BTreeMap<String, BTreeMap<String, usize>
     })
 }
 
-/// Ten bins of the same width.
+/// Ten bins of equal width.
 fn calibration(stated: &[&Stated]) -> Vec<Bin> {
     let bin = |p: f64| ((p * 10.0) as usize).min(9);
     let of = |k: usize| {
@@ -193,11 +192,11 @@ fn calibration(stated: &[&Stated]) -> Vec<Bin> {
     (0..10).filter_map(of).collect()
 }
 
-/// Less than this, nats per 1000 pixels, the oracle itself has not gained: a ratio to it means
-/// nothing. It is 15 nats over a recording of 1.5 million pixels, 20 small views of 4 frames.
+/// Minimum gain of the oracle, nats per 1000 pixels; below it a ratio to it means nothing. It is 15 nats
+/// over a recording of 1.5 million pixels, 20 small views of 4 frames.
 const MIN_ORACLE: f64 = 0.01;
 
-/// Gain of `method` over the oracle's, where both are there.
+/// Gain of `method` over the oracle's; `None` without the method or where the oracle gains too little.
 pub fn ratio(gains: &Gains, method: &str, side: fn(&Gain) -> f64) -> Option<f64> {
     let (gain, oracle) = (side(gains.methods.get(method)?), side(&gains.oracle));
     (oracle >= MIN_ORACLE).then(|| gain / oracle).filter(|r| r.is_finite())

@@ -50,19 +50,19 @@ pub struct CannotTell {
 pub const CERTAIN: f64 = 0.9;
 
 impl Finding {
-    /// Says that something is there.
+    /// Whether it says that something is there.
     pub fn claims(&self) -> bool {
         self.status != "not-identifiable"
     }
 
-    /// The name it gives.
+    /// The name it gives, if any.
     pub fn name(&self) -> Option<&str> {
         let names = ["named", "one-of"].contains(&self.status.as_str());
         let best = || self.alternatives.first().map(|a| a.effect.as_str());
         self.effect.as_deref().or_else(best).filter(|_| names)
     }
 
-    /// Of a name, 0 where it is not offered.
+    /// Probability of a name, 0 where it is not offered.
     pub fn probability(&self, id: &str) -> f64 {
         let offered = self.alternatives.iter().find(|a| a.effect == id);
         offered.and_then(|a| a.probability).unwrap_or(0.0)
@@ -74,7 +74,7 @@ impl Finding {
         self.name().filter(|_| sure)
     }
 
-    /// On the axis of the label, or on one on which it shows as well.
+    /// Whether it is on the label's axis, or on one on which the cause shows as well.
     pub fn right_axis(&self, hidden: &Hidden) -> bool {
         // Words for one axis: disparity is focal length times baseline over distance.
         let depth = |axis: &str| ["z", "disparity", "range"].contains(&axis);
@@ -82,12 +82,12 @@ impl Finding {
         same(&hidden.axis) || hidden.also.iter().any(same)
     }
 
-    /// Nothing is known by name, but what kind of thing it is and what it depends on.
+    /// Whether statistic and axis are right, whatever the name.
     pub fn right_place(&self, hidden: &Hidden) -> bool {
         self.statistic == hidden.statistic && self.right_axis(hidden)
     }
 
-    /// What both stretches share over what either holds; `None` where there is nothing to compare.
+    /// Intersection over union of both intervals; `None` where there is nothing to compare.
     pub fn overlap(&self, hidden: &Hidden) -> Option<f64> {
         let truth = hidden.interval.filter(|_| self.axis == hidden.axis)?;
         let [Some(low), Some(high)] = self.interval else { return None };
@@ -109,7 +109,7 @@ impl Verdict {
         self.findings.iter().filter(|f| f.claims())
     }
 
-    /// A mismatch is what a user would act upon.
+    /// Whether it is a mismatch with a finding: what a user would act upon.
     pub fn finds_something(&self) -> bool {
         self.verdict == "mismatch" && self.claims().next().is_some()
     }
@@ -120,7 +120,7 @@ impl Verdict {
     }
 }
 
-/// The view that a verdict asks for, by the first finding that is not sure of its name.
+/// The view asked for by the first finding in doubt.
 pub fn advised_view(verdict: &Value) -> Option<Pose> {
     Verdict::read(verdict).ok()?.in_doubt()?.next_view
 }

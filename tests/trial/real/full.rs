@@ -1,4 +1,4 @@
-//! All that the tool finds in a real recording: of a real sensor nobody knows more.
+//! Everything the tool finds in a real recording; nobody knows more of a real sensor.
 
 use std::path::Path;
 
@@ -15,19 +15,19 @@ use kinoise::rng::Seed;
 use kinoise::terms::Statistic;
 use kinoise::view::{Recording, View};
 
-/// What is learnt of a recording does not depend on the set it is learnt for.
+/// Fixed: what is learnt of a recording does not depend on the set it is learnt for.
 const SEED: Seed = Seed(1);
-/// What was hidden behind the first findings is found in the next round.
+/// Maximum number of rounds: what the first findings masked is found in the next round.
 const MAX_ROUNDS: usize = 3;
 
 /// A recording with a model that it does not contradict.
 pub struct Full {
-    /// With the views that the diagnosis could use.
+    /// Only the views that the diagnosis could use.
     pub recording: Recording,
     pub model: NoiseModel,
-    /// One for each of the model's effects.
+    /// One for each of the model's effects, in their order.
     pub terms: Vec<Hidden>,
-    /// Measurements of the target in each view.
+    /// Number of measurements of the target in each view.
     measured: Vec<f64>,
 }
 
@@ -57,13 +57,13 @@ impl Full {
         Ok(Full { recording, model, terms, measured })
     }
 
-    /// Of all measurements, how many lie in these views.
+    /// Share of all measurements that lie in these views.
     pub fn share(&self, views: &[usize]) -> f64 {
         views.iter().map(|&k| self.measured[k]).sum::<f64>() / self.measured.iter().sum::<f64>()
     }
 }
 
-/// A model, what was found to extend it, and what is still left to be found.
+/// A model, what was found to extend it, and what is still unexplained.
 pub struct Explained {
     pub model: NoiseModel,
     terms: Vec<Hidden>,
@@ -71,8 +71,8 @@ pub struct Explained {
     left: Vec<String>,
 }
 
-/// What calibration makes of these views, and diagnosis as often as it finds something, in
-/// [`MAX_ROUNDS`] at most.
+/// Calibrates on these views, then diagnoses and extends the model as long as something is found, at most
+/// [`MAX_ROUNDS`] times.
 pub fn explain(recording: &Recording) -> Result<Explained> {
     let mut model = paper_model(recording, SEED, None, &|_, _| ())?;
     let mut terms = Vec::new();
@@ -92,20 +92,20 @@ pub fn explain(recording: &Recording) -> Result<Explained> {
         model = done.model;
         round += 1;
     };
-    // The same bytes every time, and no word of where they come from.
+    // The same bytes every time, and no hint of where they come from.
     let created = "1970-01-01T00:00:00Z".into();
     model.provenance = Provenance { created, sha256: Map::new(), ..model.provenance };
     Ok(Explained { model, terms, fields, left })
 }
 
-/// Does the extended model hold an entry for it?
+/// Whether the extended model holds an entry for it.
 fn extends(f: &Finding) -> bool {
     let keeps = matches!(f.status, Status::Named | Status::OneOf) || !f.terms.is_empty();
     keeps && f.of_some.is_none()
 }
 
-/// A finding as the truth of a set: its nats are those of one measurement, for a mean that is off by
-/// s sigma and for a sigma that is off by s of itself.
+/// A finding as the truth of a set. Its nats are those of one measurement: for a mean off by s sigma, or for
+/// a sigma off by the fraction s of itself.
 fn hidden(f: &Finding) -> Hidden {
     let mut names: Vec<&str> = Vec::new();
     if !matches!(f.status, Status::Recalibrate | Status::Unexplained) {
@@ -125,7 +125,7 @@ fn hidden(f: &Finding) -> Hidden {
     let statistic = json!(f.statistic);
     let mut hidden =
         Hidden::new(&names, form, [statistic.as_str().unwrap_or_default(), f.axis.id()]);
-    // A pattern of the picture shows on all the picture's axes.
+    // A pattern over the image shows on all of the image's axes.
     let also: &[&str] = match (f.statistic, f.axis.id()) {
         (Statistic::Bias, "pixel") => &["radius", "column", "row"],
         (Statistic::Bias, "radius") => &["pixel"],
@@ -142,8 +142,9 @@ fn hidden(f: &Finding) -> Hidden {
     hidden
 }
 
-/// Pixels that count as one, for a mean or a variance: a flat window of `length_px` squared has that
-/// sum of its correlation, and two thirds of the length each way that of its square.
+/// Number of pixels that count as one, for a mean or a variance. A flat window of `length_px` squared has
+/// this area as the sum of its correlation; for the sum of its squared correlation, two thirds of the
+/// length each way.
 fn area(model: &NoiseModel, statistic: &str) -> f64 {
     let entry = model.effects.iter().find(|e| e.id == "spatial-correlation");
     let value = entry.and_then(|e| e.parameters.get("length_px"));

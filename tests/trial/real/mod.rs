@@ -1,14 +1,13 @@
-//! Recordings that a real sensor took, with something struck from their model or with nothing done
-//! to them at all.
+//! Recordings of a real sensor, with a term struck from their model or with nothing done to them at all.
 //!
-//! What is hidden here cannot be known but by the tool itself: the *full model* of a recording is
-//! what calibration and diagnosis find in it, asked again until they find no more. This is the one
-//! world that takes its truth from what is on trial. It asks less than the others therefore: a term
-//! that was struck must be found and named again from other views than all (amnesia); and one half
-//! of a recording must not contradict what was learnt of the other (halves).
+//! Only the tool itself can know what is hidden here: the *full model* of a recording is what calibration
+//! and diagnosis find in it, repeated until they find no more. This is the only world that takes its truth
+//! from what is on trial, so it asks less than the others: a term that was struck must be found and named
+//! again from a part of the views (amnesia), and one half of a recording must not contradict what was learnt
+//! of the other (halves).
 //!
-//! Nothing real is in this repository: the words come from the user's own folder of data and go to
-//! the user's own output folder.
+//! Nothing real is in this repository: the images come from the user's own data folder and go to the user's
+//! own output folder.
 
 mod full;
 #[cfg(test)]
@@ -32,26 +31,25 @@ use kinoise::model::NoiseModel;
 use kinoise::rng::{Seed, Stream};
 use kinoise::view::{View, ViewNotes};
 
-/// Of the views that a recording has, a set takes at least and at most this share.
+/// Smallest and largest share of a recording's views in a set.
 const KEPT: [f64; 2] = [0.6, 0.92];
-/// A diagnosis of fewer says too little.
+/// Minimum number of views; a diagnosis of fewer says too little.
 const MIN_VIEWS: usize = 6;
-/// A term that gains less is not what the recording needs, nats.
+/// Minimum gain of a term that is struck, nats; a weaker one is not what the recording needs.
 const MIN_NATS: f64 = 50.0;
-/// Terms without a name are known by where they are only: one set in so many may strike one.
+/// Terms without a name are known by their place only: one set in this many may strike one.
 const NAMELESS_EVERY: u32 = 5;
 
 /// A set of real views.
 struct Real {
     full: Arc<Full>,
-    /// Numbers of the views, ascending.
+    /// Indices of the views, ascending.
     views: Vec<usize>,
     model: NoiseModel,
     truth: Truth,
 }
 
-/// What the tool finds in each recording in `data`; those are left out in which it does not come to
-/// an end.
+/// Learns each recording in `data`; leaves out those that remain unexplained.
 pub fn learn(data: &Path) -> Result<Vec<Arc<Full>>> {
     let (mut known, mut whys) = (Vec::new(), Vec::new());
     for path in recordings(data) {
@@ -91,7 +89,7 @@ fn recordings(data: &Path) -> Vec<PathBuf> {
     folders.into_iter().filter_map(of).collect()
 }
 
-/// Make the set that is asked for of a known recording, by lot where there are several.
+/// Makes the set that is asked for from a known recording, chosen at random.
 pub fn conceal(asked: &Asked, known: &[Arc<Full>]) -> Result<Box<dyn ConcealedSet>> {
     let mut rng = Seed(asked.seed).stream("real/set");
     let mut known = known.to_vec();
@@ -106,7 +104,7 @@ pub fn conceal(asked: &Asked, known: &[Arc<Full>]) -> Result<Box<dyn ConcealedSe
     Err(of_no_use(&whys))
 }
 
-/// The set of this recording.
+/// Makes the set from this recording.
 fn taken(full: Arc<Full>, asked: &Asked, rng: &mut Stream) -> Result<Real> {
     let all = full.recording.views.len();
     let (mut model, mut hidden) = (full.model.clone(), Vec::new());
@@ -139,7 +137,7 @@ fn taken(full: Arc<Full>, asked: &Asked, rng: &mut Stream) -> Result<Real> {
     Ok(Real { full, views, model, truth })
 }
 
-/// `count` of all views by lot, and the others, both ascending.
+/// `count` of all view indices at random, and the others, both ascending.
 fn dealt(all: usize, count: usize, rng: &mut Stream) -> [Vec<usize>; 2] {
     let mut numbers: Vec<usize> = (0..all).collect();
     numbers.shuffle(rng);
@@ -149,7 +147,7 @@ fn dealt(all: usize, count: usize, rng: &mut Stream) -> [Vec<usize>; 2] {
     [numbers, rest]
 }
 
-/// Which of the full model's terms is struck, and what that is worth in these views.
+/// Index of the full model's term that is struck, and that term with its worth in these views.
 fn struck(
     full: &Full,
     asked: &Asked,
@@ -196,7 +194,7 @@ impl ConcealedSet for Real {
     }
 }
 
-/// The view's images as they are. What a person noted on it might tell.
+/// Copies the view's images as they are. A person's notes are left out: they might reveal something.
 fn copy(view: &View, folder: &Path) -> Result<()> {
     for (kind, files) in [("depth", &view.depth), ("ir", &view.infrared)] {
         let Some(first) = files.first() else { continue };

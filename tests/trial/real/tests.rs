@@ -1,4 +1,4 @@
-//! Oracles: a recording that was simulated stands for a real one, its causes known.
+//! Tests on a simulated recording in place of a real one, so that its causes are known.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -11,7 +11,7 @@ use kinoise::model::SigmaModel;
 use kinoise::scene::Target;
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
 
-/// A folder of data in which one recording has a bowl and noise that grows to the rim.
+/// A data folder with one recording that has a bowl and noise that grows towards the rim.
 fn data() -> &'static Path {
     static DATA: OnceLock<tempfile::TempDir> = OnceLock::new();
     DATA.get_or_init(|| {

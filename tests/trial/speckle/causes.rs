@@ -1,4 +1,4 @@
-//! What can be switched on, how far, and what a solver could rightly call it.
+//! Causes that can be switched on, how far, and what a solver could rightly call them.
 
 use rand::Rng;
 use rand::seq::IndexedRandom;
@@ -16,25 +16,25 @@ use Reach::{Among, Either, Times, Up};
 /// A cause that can be concealed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Switch {
-    /// Of the speckle world.
+    /// Name in the speckle simulator.
     pub cause: &'static str,
-    /// Effects that it rightly is called; none where "unexplained" or "recalibrate" is right.
+    /// Effects that are right names for it; empty where "unexplained" or "recalibrate" is right.
     names: &'static str,
-    /// The statistic, the axis, and the axes on which it shows as well.
+    /// The statistic, the axis, and further axes on which it shows.
     place: &'static str,
     reach: Reach,
 }
 
-/// Where a cause goes at size 1; sizes are about 1/3, 1/2, 1 and 1.7.
+/// Value of a cause at size 1; sizes are about 1/3, 1/2, 1 and 1.7.
 #[derive(Debug, Clone, Copy)]
 enum Reach {
-    /// To either side of nothing, as far as this.
+    /// This times the size, with either sign.
     Either(f64),
-    /// Up from nothing.
+    /// This times the size.
     Up(f64),
-    /// Times this to the size.
+    /// The usual value times this to the power of the size.
     Times(f64),
-    /// The four sizes in order: what a cause can be does not go by degrees.
+    /// One value for each of the four sizes, for causes that do not vary by degrees.
     Among([f64; 4]),
 }
 
@@ -47,14 +47,14 @@ const fn switch(
     Switch { cause, names, place, reach }
 }
 
-/// Either name of a lens that nobody knows: it bends the rays, and is met again, at the reference's
-/// distance, in the disparity.
+/// Right names of an unknown lens distortion: it bends the rays and, at the reference's distance, enters the
+/// disparity again.
 const LENS: &str = "lens-distortion radial-disparity-bias";
 /// Sunlight adds noise where the pattern is faint: far, and at the corners.
 const SUN: &str = "ambient-light vignetting range-exponent";
 
-/// A larger window averages more, so that the noise shrinks as well. Laser speckle stands still with
-/// the scene.
+/// Causes that can be switched on. A larger window averages more, so the noise shrinks as well. Laser
+/// speckle is fixed to the scene.
 pub(super) static SWITCHES: [Switch; 12] = [
     switch("lens_k1", LENS, "bias radius pixel", Either(0.012)),
     switch("lens_k2", LENS, "bias radius pixel", Either(0.03)),
@@ -70,10 +70,10 @@ pub(super) static SWITCHES: [Switch; 12] = [
     switch("speckle", "frozen-noise", "correlation frame z", Times(1.6)),
 ];
 const STEPS: [f64; 4] = [0.16, 0.2, 0.25, 0.5];
-/// Added to the usual.
+/// Added to the usual window.
 const WINDOWS: [f64; 4] = [2.0, 4.0, 6.0, 10.0];
 
-/// The unit as it is without a cause: no two are alike.
+/// The unit without a cause, drawn at random: no two are alike.
 pub(super) fn base(rng: &mut Stream) -> Result<Causes> {
     let window: f64 = *[7.0, 9.0, 9.0, 11.0].choose(rng).unwrap_or(&9.0);
     let usual = Causes::default();
@@ -94,7 +94,7 @@ impl Switch {
         &SWITCHES[rng.random_range(0..SWITCHES.len())]
     }
 
-    /// `base` with the cause switched on, and what that is called.
+    /// `base` with the cause switched on, and its label.
     pub fn turn(
         &self,
         base: Causes,
@@ -114,7 +114,7 @@ impl Switch {
         };
         let mut causes = base.with(self.cause, value)?;
         if self.cause == "warm_up_k" {
-            // Most of it within the session.
+            // Most of the warm-up falls within the session.
             causes = causes.with("warm_up_s", rng.random_range(100.0..200.0))?;
         }
         let names: Vec<&str> = self.names.split_whitespace().collect();
@@ -127,7 +127,7 @@ impl Switch {
     }
 }
 
-/// The switch, and in the catalogue's words what follows from it by geometry alone.
+/// The switched value, and the catalogue's parameters that follow from it by geometry alone.
 fn parameters(cause: &str, value: f64, causes: &Causes, scenery: &Scenery) -> Map<String, Value> {
     let mut all = Map::from_iter([(cause.to_string(), Value::from(value))]);
     let mut say = |name: &str, value: f64| all.insert(name.into(), value.into());

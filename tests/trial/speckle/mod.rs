@@ -1,6 +1,5 @@
-//! Concealed recordings by the speckle simulator: dots seen and matched twice at the same poses, once
-//! with a cause switched on and once without. No formula of an error exists anywhere; the truth is
-//! the switch.
+//! Concealed recordings by the speckle simulator: dots imaged and matched twice at the same poses, once with
+//! a cause switched on and once without. No error formula exists anywhere; the truth is the switch.
 
 mod causes;
 
@@ -21,17 +20,17 @@ use kinoise::scene::{Board, Print, Target, WHITE};
 use kinoise::simulate::{GridView, Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use kinoise::view::Sensor;
 
-/// What the picture of a Kinect is shrunk by. The matcher's window does not shrink: at a quarter it
-/// covers too much of a board far away.
+/// Factor by which a Kinect's image is reduced. The matcher's window is not: at a quarter it covers too much
+/// of a distant board.
 const SHRINK: usize = 2;
 const SHRINK_SMALL: usize = 4;
-/// Few, since every frame is matched.
+/// Frames per view: few, since every frame is matched.
 const FRAMES: usize = 3;
 const NEAREST_M: f64 = 0.9;
 const FARTHEST_M: f64 = 2.8;
-/// A wall goes on no farther within the picture.
+/// Maximum depth of a wall within the image.
 const WALL_ENDS_M: f64 = 3.8;
-/// The matcher gives up on steeper boards near by.
+/// Maximum tilt: the matcher gives up on steeper boards nearby.
 const STEEPEST_RAD: f64 = 0.9;
 
 /// Names of the causes that can be concealed.
@@ -39,13 +38,13 @@ pub fn known() -> impl Iterator<Item = &'static str> {
     SWITCHES.iter().map(|s| s.cause)
 }
 
-/// The set that is `asked`: `recording/` and, taken with nothing switched on, `simulated/`. What is
-/// asked in nats chooses a size of the cause; what it is worth nobody can tell.
+/// The set that is `asked`: `recording/` and, taken with nothing switched on, `simulated/`. The nats asked
+/// for choose a size of the cause; its worth in nats is unknown.
 pub fn conceal(asked: &Asked) -> Result<Box<dyn ConcealedSet>> {
     Ok(Box::new(taken(asked, None)?.1))
 }
 
-/// The set, with one view more where one is wanted, and that view's pose.
+/// The set, with one more view if wanted, and that view's pose.
 fn taken(asked: &Asked, more: Option<&Pose>) -> Result<(Option<Pose>, Speckle)> {
     let Asked { cell, seed, small, .. } = *asked;
     if ![Cell::Null, Cell::Single].contains(&cell) || asked.names.len() > 1 {
@@ -93,7 +92,7 @@ fn taken(asked: &Asked, more: Option<&Pose>) -> Result<(Option<Pose>, Speckle)> 
         views: views.clone(),
         physics: Physics::Speckle { causes },
         infrared: session.infrared,
-        // Neither recording has its noise from the other's seed.
+        // The two recordings draw their noise from different seeds.
         seed: seed_of(&sha256_hex(format!("{digest}/{which}").as_bytes())),
     };
     let set = Speckle {
@@ -126,7 +125,7 @@ impl ConcealedSet for Speckle {
     }
 }
 
-/// Where the target stands, and what it is.
+/// The target and its poses.
 struct Session {
     poses: Vec<GridView>,
     scenery: Scenery,
@@ -134,7 +133,7 @@ struct Session {
 }
 
 impl Session {
-    /// By lot; what a cause needs to show at all it has.
+    /// Draws a session that has whatever the cause needs to show at all.
     fn draw(cause: &str, sensor: &Sensor, rng: &mut Stream) -> Self {
         let boarded = rng.random::<bool>() || cause == "bow_m";
         let (width_m, height_m) = (rng.random_range(1.0..1.3), rng.random_range(0.8..1.0));
@@ -160,7 +159,7 @@ impl Session {
         Session { poses: (0..n).map(pose).collect(), scenery, infrared }
     }
 
-    /// As near to `pose` as the target can stand: out of reach of the matcher nothing is learnt.
+    /// Pose nearest to `pose` that the target can take; beyond the matcher's reach nothing is learnt.
     fn nearest(&self, pose: &Pose, sensor: &Sensor) -> GridView {
         let boarded = matches!(self.scenery.target, Target::Board(_));
         let z_m = pose.z_m.clamp(NEAREST_M, FARTHEST_M);
@@ -169,7 +168,7 @@ impl Session {
     }
 }
 
-/// What the matcher, and the wall within the picture, let a target lean, rad.
+/// Maximum tilt that the matcher, and for a wall its extent within the image, allow, rad.
 fn steepest(boarded: bool, z_m: f64, azimuth_rad: f64, sensor: &Sensor) -> f64 {
     let wall = wall_tilt(&sensor.camera, z_m, azimuth_rad, WALL_ENDS_M);
     if boarded { STEEPEST_RAD } else { STEEPEST_RAD.min(wall) }
@@ -204,8 +203,8 @@ mod tests {
         assert!(conceal(&asked(Cell::Null, &[], 5.0, 1)).unwrap().truth().hidden.is_empty());
     }
 
-    /// Two recordings of the same views with other noise; nothing in their text tells the cause. A view
-    /// more changes no byte of the others, and stands within the matcher's reach.
+    /// Two recordings of the same views with different noise; nothing in their text reveals the cause. One
+    /// more view changes no byte of the others and stands within the matcher's reach.
     #[test]
     fn a_set_is_two_recordings_of_the_same_poses_and_a_view_more_is_all_that_changes() {
         let set = conceal(&asked(Cell::Single, &["lens_k1"], 50.0, 2)).unwrap();
