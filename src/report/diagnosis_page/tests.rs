@@ -59,6 +59,9 @@ fn unexplained() -> Finding {
         axis: Axis::Row,
         interval: [301.0, 332.0],
         shape: Some("a step at row 317, −0.08 px above and +0.08 px below".into()),
+        physics:
+            "Unexplained: the mean error depends on the row: a step at row 317, −0.08 px above"
+                .into(),
         curve: curve("row (px)", 479.0, |v| if v < 317.0 { -0.08 } else { 0.08 }),
         ..finding(Status::Unexplained, None)
     }
@@ -198,7 +201,10 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 9] {
         ),
         (
             diagnosis(Mismatch, vec![unexplained()]),
-            &["Its curve: a step at row 317, −0.08 px above", "measured, not in the catalogue"],
+            &[
+                "depends on the row: a step at row 317, −0.08 px above.",
+                "measured, not in the catalogue",
+            ],
         ),
         (
             diagnosis(Mismatch, vec![Finding { contradicted: Some("row-noise"), ..unexplained() }]),
