@@ -7,7 +7,6 @@ use super::checks::overstated::SHARE;
 use super::checks::textures::replicated;
 use super::diagnosis::{Detectable, Finding, Status};
 use super::distance::reference::{self, can_happen};
-use super::distance::shifted_sigma::forget_shifted_sigma;
 use super::echoes::{echoes, fold_into_sigma, forget_noise_of_frames};
 use super::edges::mixing::mixing;
 use super::finding::findings;
@@ -134,10 +133,6 @@ impl Case<'_> {
         found.extend(findings);
         let laws = self.laws(&bias, reference::bent_m(&found)).into_iter();
         found.extend(laws.filter(|f| self.halves_allow(f, Self::LAWS_LEVEL)));
-        if self.baseline.is_none() {
-            let [_, variance] = self.scenes();
-            forget_shifted_sigma(&mut found, &variance, &self.model.sigma, &self.known);
-        }
         forget_impossible(&mut found, self.sensor().kind);
         found.extend(of_few_views);
         tell_lines_once(&mut found);

@@ -3,5 +3,4 @@
 pub mod laws;
 pub mod reference;
 pub mod referenced_view;
-pub mod shifted_sigma;
 pub mod warm_up;
