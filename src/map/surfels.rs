@@ -137,7 +137,7 @@ impl Surfels {
         if doubtful { Association::Conflict } else { Association::New }
     }
 
-    /// Removes surfels that were seen once or twice and never again.
+    /// Removes surfels with fewer than CONFIRMED observations, the last of them PROBATION frames ago or more.
     pub fn prune(&mut self, now: u32) {
         self.surfels.retain(|s| s.seen >= CONFIRMED || now.saturating_sub(s.last) < PROBATION);
     }

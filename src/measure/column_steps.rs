@@ -192,7 +192,7 @@ mod tests {
                 assert_eq!(found.step_px, sign * STEP_PX);
                 let line = |u: usize| sign * STEP_PX * ((u as f64 - middle) / period - 0.5);
                 let off = |u: usize| stretch(u as f64) - line(u) - found.error_px(u);
-                // No column is off by even one.
+                // No step is located even one column off.
                 let largest = (0..WIDTH).map(|u| off(u).abs()).fold(0.0, f64::max);
                 assert!(largest < 0.05 * STEP_PX, "{largest}");
             }

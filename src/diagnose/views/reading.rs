@@ -136,7 +136,7 @@ fn as_ranges(
 /// something else bends the planes. Simulated ranges leave less than 1e-4, with a lens of k1 = 0.05 as well
 /// 0.007, and 0.87 of ranges 0.12.
 const PART_OF_RANGES: f64 = 0.05;
-/// Step between the pixels that are looked at.
+/// Step between the sampled pixels.
 const STRIDE: usize = 61;
 
 /// Share of the range-depth difference left in the fields' means, fitted together with a plane per view.
