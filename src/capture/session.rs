@@ -123,6 +123,8 @@ impl Session {
         let place = self.root.join(&view.name);
         let old = self.root.join(PARTIAL).join(format!("{OLD}{}", view.name));
         let replaced = place.exists();
+        // What an earlier retake could not remove; the rename says so if it still stands.
+        let _ = fs::remove_dir_all(&old);
         if replaced {
             fs::rename(&place, &old).map_err(|e| failed(&place, e))?;
         }

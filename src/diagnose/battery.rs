@@ -17,10 +17,10 @@ use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
 use super::missing::shapes::Step;
 use super::missing::{self, DropoutOutcome, missing};
-use super::noise::in_time::{FIXED_PATTERN, pattern_px2};
+use super::noise::in_time::pattern_px2;
 use super::noise::scatter::ScatterResult;
 use super::noise::texture_finding::TextureFinding;
-use super::options::Ablation;
+use super::options::{Ablation, EACH_LEVEL};
 use super::search::bias;
 use super::search::few_views::few_views;
 use super::search::outcome::Outcome;
@@ -197,7 +197,7 @@ impl Case<'_> {
         steps: Vec<Finding>,
     ) -> Vec<Finding> {
         let sigma_mm = typical_sigma_mm(&self.fields);
-        let level = self.level(Self::EACH_LEVEL);
+        let level = self.level(EACH_LEVEL);
         let mixing = mixing(&self.fields, self.twins(), level)
             .filter(|m| self.is_more(&m.families, &m.parameters) && self.stands(m.p, level));
         let textures = scatter.textures.iter().cloned().chain(scatter.tails.clone()).chain(mixing);
@@ -210,8 +210,7 @@ impl Case<'_> {
         let textures = textures.map(told).chain(self.overstated(scatter));
         let mut found: Vec<Finding> = textures.chain(steps).collect();
         // Fixed lines have no name, but they are learnt.
-        let has_pattern = scatter.textures.iter().any(|t| t.families.contains(&FIXED_PATTERN));
-        let pattern_px2 = if has_pattern { pattern_px2(&scatter.structure) } else { 0.0 };
+        let pattern_px2 = pattern_px2(&scatter.structure, &scatter.textures, &self.known);
         for f in found.iter_mut().filter(|f| are_lines(f)) {
             let axis = f.axis;
             let lines = mean.lines.iter().filter(|l| l.axis == axis);
@@ -233,7 +232,7 @@ impl Case<'_> {
             return Vec::new();
         }
         let (survey, camera, seed) = (&self.survey, &self.sensor().camera, self.options.seed);
-        let level = self.level(Self::EACH_LEVEL);
+        let level = self.level(EACH_LEVEL);
         let bounds = survey.bounds(camera);
         let bias = || {
             let candidates = bias::candidates(&bounds);

@@ -8,7 +8,7 @@ use super::finding::pixels::{mean_of, pixel_terms, terms_of};
 use super::missing::DropoutOutcome;
 use super::noise::lines::LearntLines;
 use super::noise::still::{KeptPattern, beside_bias, still};
-use super::options::{Ablation, DiagnoseOptions, EACH_LEVEL, measure_options};
+use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
 use super::steps::lattice;
 use super::steps::lattice::Quantisation;
@@ -174,7 +174,6 @@ impl<'a> Case<'a> {
     /// the laws, and `EACH_LEVEL` for each of some 20 others. If independent, all add up to 7/6 of the rate.
     pub const MEAN_LEVEL: f64 = 0.4;
     pub const VARIANCE_LEVEL: f64 = 0.25;
-    pub const EACH_LEVEL: f64 = EACH_LEVEL;
     pub const LAWS_LEVEL: f64 = 0.1;
 
     pub fn level(&self, share: f64) -> f64 {

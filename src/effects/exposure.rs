@@ -22,16 +22,12 @@ pub struct Instant {
     pub view_s: f64,
 }
 
-/// Values of an effect, by its id, that depend on what is seen alone.
-pub type Still = HashMap<(&'static str, Kept), Vec<f32>>;
-
-/// Which values these are: a model may hold the shape of an effect beside the effect itself.
+/// What is kept while the same is seen, by the effect's id: a model may hold the shape of an effect beside the
+/// effect itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kept {
-    /// Made by the effect ([`Exposure::with_kept`]).
-    Made,
-    /// Of a learnt shape at rest.
-    Shape,
+    Effect(&'static str),
+    Shape(&'static str),
 }
 
 /// A frame in progress. Arrays are per pixel, row-major; NaN means no value.
@@ -58,7 +54,7 @@ pub struct Exposure<'a> {
     /// State that an effect keeps from frame to frame of a view, by its id; frames come in order.
     pub memory: HashMap<&'static str, Vec<f32>>,
     /// Values that an effect derived from `seen` alone; dropped when something else is seen.
-    pub still: Still,
+    pub still: HashMap<Kept, Vec<f32>>,
 }
 
 impl Exposure<'_> {
@@ -110,12 +106,12 @@ impl Exposure<'_> {
     /// Calls `act` with what `make` returned when the sensor first saw what it sees now.
     pub fn with_kept(
         &mut self,
-        id: &'static str,
+        key: Kept,
         make: impl FnOnce(&Self) -> Vec<f32>,
         act: impl FnOnce(&mut Self, &[f32]),
     ) {
-        let kept = self.still.remove(&(id, Kept::Made)).unwrap_or_else(|| make(self));
+        let kept = self.still.remove(&key).unwrap_or_else(|| make(self));
         act(self, &kept);
-        self.still.insert((id, Kept::Made), kept);
+        self.still.insert(key, kept);
     }
 }

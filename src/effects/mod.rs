@@ -17,7 +17,7 @@ mod traces;
 pub use active::{Acting, Active};
 pub use card::{Card, Parameter, Settings, Stage};
 pub use draw::{Draw, Scope, fill_normal, logistic};
-pub use exposure::{Exposure, Instant, Kept, Still};
+pub use exposure::{Exposure, Instant, Kept};
 pub use fitted::{Estimate, Fitted};
 pub use range_not_depth::RAY_FOR_DEPTH;
 pub use traces::{Bounds, Flat, Inverse, Known, Smallest};

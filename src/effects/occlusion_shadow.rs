@@ -1,6 +1,6 @@
 //! The projector does not reach all that the camera sees.
 
-use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
+use super::{Card, Draw, Effect, Exposure, Kept, Parameter, Settings, Stage};
 use crate::sensors::SensorKind;
 
 pub struct OcclusionShadow;
@@ -28,7 +28,7 @@ pub(super) static CARD: Card = Card {
 impl Effect for OcclusionShadow {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let share = settings.at(0) as f32;
-        exposure.with_kept(CARD.id, |e| shadow(e, share), |e, shadow| {
+        exposure.with_kept(Kept::Effect(CARD.id), |e| shadow(e, share), |e, shadow| {
             for (d, dark) in e.disparity.iter_mut().zip(shadow) {
                 if *dark > 0.0 {
                     *d = f32::NAN;

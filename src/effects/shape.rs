@@ -70,16 +70,16 @@ impl Effect for Shape {
     fn forward(&self, _: &Settings, exposure: &mut Exposure, _: &Draw) {
         let (moving, still): (Vec<&Term>, Vec<&Term>) =
             self.terms.iter().partition(|t| t.needs().session);
-        let kept = exposure.still.remove(&(self.card.id, Kept::Shape));
-        let at_rest = kept.unwrap_or_else(|| values(&still, exposure));
-        if moving.is_empty() {
-            self.change(exposure, &at_rest);
-        } else {
-            let mut now = values(&moving, exposure);
-            now.iter_mut().zip(&at_rest).for_each(|(n, r)| *n += r);
-            self.change(exposure, &now);
-        }
-        exposure.still.insert((self.card.id, Kept::Shape), at_rest);
+        let at_rest = |e: &Exposure| values(&still, e);
+        exposure.with_kept(Kept::Shape(self.card.id), at_rest, |exposure, at_rest| {
+            if moving.is_empty() {
+                self.change(exposure, at_rest);
+            } else {
+                let mut now = values(&moving, exposure);
+                now.iter_mut().zip(at_rest).for_each(|(n, r)| *n += r);
+                self.change(exposure, &now);
+            }
+        });
     }
 }
 

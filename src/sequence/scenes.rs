@@ -54,11 +54,15 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     truth.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     let size = size_of(&moments[0].depth)?;
     let own = "7-Scenes' own intrinsics 585,585,320,240";
-    let given = assumed.intrinsics.or(assumed.preset.map(|_| INTRINSICS));
-    match given {
-        None => remarks.push(format!("{own} are used; give --intrinsics for another camera")),
-        Some(given) if given != INTRINSICS => remarks.push(format!("--intrinsics replaces {own}")),
-        Some(_) => {}
+    match (assumed.intrinsics, assumed.preset) {
+        (None, None) => {
+            remarks.push(format!("{own} are used; give --intrinsics for another camera"));
+        }
+        (None, Some(_)) => remarks.push(format!("--sensor replaces {own}")),
+        (Some(given), _) if given != INTRINSICS => {
+            remarks.push(format!("--intrinsics replaces {own}"));
+        }
+        (Some(_), _) => {}
     }
     let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
     let frames: Vec<&FrameRef> = moments.iter().map(|m| &m.depth).collect();

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::camera::Rays;
-use crate::effects::{Active, Exposure, Instant, ROOM_LUX, Stage, Still, fill_normal};
+use crate::effects::{Active, Exposure, Instant, Kept, ROOM_LUX, Stage, fill_normal};
 use crate::frame::Frame;
 use crate::model::SigmaModel;
 use crate::rng::Seed;
@@ -33,7 +33,7 @@ pub struct Shooting<'a> {
     sigma: Vec<f32>,
     light: Vec<f32>,
     pub(super) memory: HashMap<&'static str, Vec<f32>>,
-    still: Still,
+    still: HashMap<Kept, Vec<f32>>,
 }
 
 impl FormulaSensor<'_> {
@@ -58,7 +58,7 @@ impl FormulaSensor<'_> {
             sigma: without_rounding(sigma, seen, self.sensor),
             light: light_of(seen, self.rays),
             memory,
-            still: Still::new(),
+            still: HashMap::new(),
         }
     }
 }

@@ -17,6 +17,7 @@ use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::tails::SURE_SCALE_ERRORS;
 use crate::diagnose::noise::view_mean::{ViewMean, nats, variance_px2};
+use crate::diagnose::options::EACH_LEVEL;
 use crate::diagnose::steps::contradicted;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::tiles::Tile;
@@ -47,7 +48,7 @@ impl Case<'_> {
             return Vec::new();
         }
         let sigma_mm = typical_sigma_mm(&self.fields);
-        let level = self.level(Self::EACH_LEVEL);
+        let level = self.level(EACH_LEVEL);
         let claims = textures(&scatter.structure, &self.known);
         let claims = claims.into_iter().chain(self.tails_claimed(&scatter.structure));
         let claims = claims.chain(self.edges_claimed()).chain(self.losses_claimed());

@@ -44,7 +44,8 @@ impl DetectionCriteria<'_> {
         }
         let bases: Vec<&Basis> = self.beside.iter().chain([&unit.basis]).collect();
         let m = self.beside.as_ref().map_or(0, Basis::count);
-        let alone = beside_chosen(&evidence_of_bases(&self.left(), &bases), m, self.rules.prior)?;
+        let views = evidence_of_bases(&self.left(), &bases);
+        let alone = beside_chosen(&views, m, self.rules.prior)?;
         let null = Null::of_candidate(&alone, self.rules.prior)?;
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
         let threshold = self.outcome.noise.threshold(self.rules.level);
@@ -61,7 +62,11 @@ impl DetectionCriteria<'_> {
         let by_gain = (margin + (margin * margin + 2.0 * need).sqrt()) / information.sqrt();
         let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
         let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
-        let by_size = self.rules.min_rms(&unit.basis, largest) * (weight / information).sqrt();
+        // The size is that of the shape, whatever else is fitted beside it.
+        let own = |v: &Evidence| u.dot(&(v.a.view((m, m), (u.len(), u.len())) * &u));
+        let by_size = self.rules.min_rms(&unit.basis, largest)
+            * (weight / views.iter().map(own).sum::<f64>()).sqrt()
+            + margin / information.sqrt();
         Some(by_gain.max(by_size)).filter(|size| *size > 0.0 && size.is_finite())
     }
 

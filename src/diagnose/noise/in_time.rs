@@ -35,7 +35,7 @@ fn of_frames(
 }
 
 pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
-    let fixed = ViewMean::of_pairs(views, |s| s.still.fixed_px2);
+    let fixed = fixed(views);
     let variance = variance_px2(views);
     let known_px = known.parameter(FIXED_PATTERN, "sigma_px").unwrap_or(0.0);
     let pattern = Shared {
@@ -165,15 +165,24 @@ fn mean_precision(views: &[Structure]) -> f64 {
     ViewMean::of(views, precision).map_or(0.0, |m| m.value)
 }
 
-/// Variance of the errors that pixels repeat in every view, px^2.
-pub fn pattern_px2(views: &[Structure]) -> f64 {
-    ViewMean::of_pairs(views, |s| s.still.fixed_px2).map_or(0.0, |m| m.value)
+/// Variance of what pixels err by in every view alike, px^2.
+fn fixed(views: &[Structure]) -> Option<ViewMean> {
+    ViewMean::of_pairs(views, |s| s.still.fixed_px2)
+}
+
+/// Variance of a pattern that was `found` or is known, px^2; else 0.
+pub fn pattern_px2(views: &[Structure], found: &[TextureFinding], known: &KnownTerms) -> f64 {
+    let found = found.iter().any(|f| f.families.contains(&FIXED_PATTERN));
+    if !found && !known.has(FIXED_PATTERN) {
+        return 0.0;
+    }
+    fixed(views).map_or(0.0, |m| m.value)
 }
 
 /// Share of the noise that is constant within a view but not common to all, by the views' mean correlations;
 /// `None` with too few frames.
 pub fn still_level(views: &[Structure]) -> Option<f64> {
-    still_beside(&beside_pattern(views, ViewMean::of_pairs(views, |s| s.still.fixed_px2)))
+    still_beside(&beside_pattern(views, fixed(views)))
 }
 
 fn still_beside(views: &[Structure]) -> Option<f64> {

@@ -32,6 +32,7 @@ use frames::{flicker, unequal};
 use in_time::{FIXED_PATTERN, in_time, pattern_px2};
 use pairs::{REACH_PX, window_of};
 use some_views::some_views;
+use still::Still;
 use structure::Structure;
 use texture_finding::{Shared, TextureFinding};
 use view_mean::{ViewMean, nats, variance_px2};
@@ -102,7 +103,7 @@ fn textures_of_some(
         let found = found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
         found || ids.iter().any(|id| known.has(id))
     };
-    let beside = if told(&[FIXED_PATTERN]) { pattern_px2(views) } else { 0.0 };
+    let beside = pattern_px2(views, found, known);
     // Relative to the view's own variance, so that near and far views scatter alike.
     let all: [(&[&str], OfView, Error, OfAll); 3] = [
         (&[ROW_NOISE], &|s| Some(s.row_px2? / s.variance_px2), &|s| s.line_error(0), lines),
@@ -210,30 +211,27 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
     };
     let afresh = "each column is shifted as one, afresh in every frame";
     let row = known_px * known_px;
-    let still = |of: fn(&Structure) -> Option<f64>, by_pattern: usize, axis, words| {
+    let still = |of: fn(&Still) -> (Option<f64>, f64), axis, words| {
         let known_px2 = known.error_of_lines_px2(axis);
         let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
-        let by_pattern = ViewMean::of(views, |s| Some(s.still.by_pattern_px2[by_pattern]));
-        let by_pattern = by_pattern.map_or(0.0, |m| m.value);
+        let by_pattern = ViewMean::of(views, |s| Some(of(&s.still).1)).map_or(0.0, |m| m.value);
         // Columns, rows and blotches share one level.
-        (ViewMean::of_pairs(views, of).map(|m| m.and_error(by_pattern)), line, 3.0)
+        let shared = ViewMean::of_pairs(views, |s| of(&s.still).0);
+        (shared.map(|m| m.and_error(by_pattern)), line, 3.0)
     };
     let all = [
         still(
-            |s| s.still.lines_px2[0],
-            0,
+            |s| (s.lines_px2[0], s.by_pattern_px2[0]),
             Axis::Column,
             "each column has a constant error of its own, unlike its neighbours'",
         ),
         still(
-            |s| s.still.lines_px2[1],
-            1,
+            |s| (s.lines_px2[1], s.by_pattern_px2[1]),
             Axis::Row,
             "each row has a constant error of its own, unlike its neighbours'",
         ),
         still(
-            |s| s.still.blotches_px2,
-            2,
+            |s| (s.blotches_px2, s.by_pattern_px2[2]),
             Axis::Pixel,
             "a fine pattern over the picture is the same in all views",
         ),

@@ -12,6 +12,7 @@ use crate::diagnose::case::{Case, MeanResult};
 use crate::diagnose::finding::pixels::{
     Whitener, common, fixed_px2, measure_tails, pixel_terms, terms_of,
 };
+use crate::diagnose::options::EACH_LEVEL;
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::steps::{Steps, forget_windows, own_step};
 use crate::diagnose::views::known::ray_share;
@@ -39,7 +40,7 @@ impl Case<'_> {
         }
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
-        let each = self.level(Self::EACH_LEVEL);
+        let each = self.level(EACH_LEVEL);
         let mut textures = self.textures(&mut structure, each);
         self.learn_lines(mean, &textures);
         self.weigh_rows(mean, &structure, &textures);
