@@ -129,7 +129,7 @@ impl Surfels {
         if let Some((_, i)) = best {
             return Association::Known(i);
         }
-        // A point slightly in front of or behind a confirmed surface is a mistake.
+        // A point slightly in front of or behind a surface seen more than CONFIRMED times is a mistake.
         let doubtful = index_map.front(block).is_some_and(|i| {
             let (_, normal, limit) = apart(p, &self.surfels[i].point);
             normal < 2.0 * limit && self.surfels[i].seen > CONFIRMED

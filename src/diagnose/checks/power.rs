@@ -24,6 +24,7 @@ use crate::diagnose::search::rules::Rules;
 use crate::diagnose::search::variance::beyond_sigma;
 use crate::diagnose::views::samples::ViewData;
 use crate::effects::{self, Smallest};
+use crate::solve::Cholesky;
 use crate::terms::{Basis, Statistic, Term};
 
 /// A layer as it was searched.
@@ -57,7 +58,7 @@ impl DetectionCriteria<'_> {
             return None;
         }
         let dispersion = null.scatter(&self.rules);
-        let need = need + 0.5 * dispersion * u.len() as f64;
+        let need = need + dispersion * cost(&alone, self.rules.prior)?;
         let margin = POWER_80 * dispersion.sqrt();
         let by_gain = (margin + (margin * margin + 2.0 * need).sqrt()) / information.sqrt();
         let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
@@ -76,6 +77,14 @@ impl DetectionCriteria<'_> {
         let left = |view: &ViewData| ViewData { response: view.without(&found), ..view.clone() };
         self.scene.data.iter().map(left).collect()
     }
+}
+
+/// Mean loss of the coefficients' own errors where each view is predicted from the others, in nats at a
+/// dispersion of 1: half a nat a coefficient, and more where one view has most of the information.
+fn cost(views: &[Evidence], prior: f64) -> Option<f64> {
+    let all = Evidence::sum(views.first()?.b.len(), prior, views).a;
+    let of = |v: &Evidence| Some(Cholesky::of(&all - &v.a)?.solve_all(v.a.clone()).trace());
+    Some(0.5 * views.iter().map(of).sum::<Option<f64>>()?)
 }
 
 impl Case<'_> {

@@ -60,11 +60,12 @@ impl DropoutOutcome {
 
 /// Fewest views that can show a rule.
 const MIN_VIEWS: usize = 4;
-/// False-alarm probability on a clean recording: for steps and curves, and for the shadow.
+/// False-alarm probability of steps and curves on a clean recording.
 pub const LEVEL: f64 = 0.003;
 /// Tests that share [`LEVEL`]: constant steps and curves, steps that begin mid-session, and the foot of a
 /// rise.
 const TESTS: f64 = 3.0;
+/// The same for the shadow.
 const SHADOW_LEVEL: f64 = 0.0005;
 const MAX_FINDINGS: usize = 3;
 /// Least gain of a later finding, as a share of the first finding's.

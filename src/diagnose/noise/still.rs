@@ -274,7 +274,7 @@ mod tests {
             // For lines and means, the pattern's own error is one of two equal parts.
             let own = if k < 3 { said / 2f64.sqrt() } else { said };
             // A scatter of 60 has an error of a tenth. The common offset is the
-            // coins'; 3 in 400 are too large.
+            // error of the coins: beyond three standard errors with probability 0.0027 each.
             assert!((0.7..1.3).contains(&(scatter / own)), "{k}: {scatter}, said {own}");
             assert!(off.abs() < 3.0 * own, "{k}: off by {off}, said {own}");
         }
