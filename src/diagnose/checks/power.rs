@@ -2,9 +2,9 @@
 //!
 //! The criteria are those of the search itself, without replication in halves, and on patches of two tiles:
 //! the null threshold for the gain over the views' dispersion, the share of the first finding's gain, and the
-//! size relative to the largest. For a shape of size s with information I, a view that was not in the fit
-//! gains s^2 I / 2 nats, with standard deviation s sqrt(I d) at dispersion d, less d / 2 per fitted
-//! coefficient.
+//! size relative to the largest. Predicted from the other views, a shape of size s gains s^2 times what it
+//! gains at size 1, with standard deviation s sqrt(I d) for an information I and a dispersion d, less what the
+//! errors of the fitted coefficients cost.
 
 use nalgebra::DVector;
 use serde_json::{Map, Value, json};
@@ -16,7 +16,7 @@ use crate::diagnose::finding::scene::Scene;
 use crate::diagnose::options::POWER_80;
 use crate::diagnose::search::MIN_SHARE_OF_GAIN;
 use crate::diagnose::search::candidate::Candidate;
-use crate::diagnose::search::evidence::Evidence;
+use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::null::{Null, beside_chosen};
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::search::prepared::evidence_of_bases;
@@ -60,7 +60,9 @@ impl DetectionCriteria<'_> {
         let dispersion = null.scatter(&self.rules);
         let need = need + dispersion * cost(&alone, self.rules.prior)?;
         let margin = POWER_80 * dispersion.sqrt();
-        let by_gain = (margin + (margin * margin + 2.0 * need).sqrt()) / information.sqrt();
+        let one = gain_of_one(&views, &u, self.rules.prior).filter(|gain| *gain > 0.0)?;
+        let scatter = margin * information.sqrt();
+        let by_gain = (scatter + (scatter * scatter + 4.0 * one * need).sqrt()) / (2.0 * one);
         let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
         let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
         // The size is that of the shape, whatever else is fitted beside it.
@@ -77,6 +79,20 @@ impl DetectionCriteria<'_> {
         let left = |view: &ViewData| ViewData { response: view.without(&found), ..view.clone() };
         self.scene.data.iter().map(left).collect()
     }
+}
+
+/// Mean gain, nats, of the shape `u` at size 1, which is the last of the columns: each view is predicted from
+/// the others, from which the columns beside it are fitted too.
+fn gain_of_one(views: &[Evidence], u: &DVector<f64>, prior: f64) -> Option<f64> {
+    let m = views.first()?.b.len() - u.len();
+    let seen = |v: &Evidence| Evidence { a: v.a.clone(), b: v.a.columns(m, u.len()) * u };
+    let whole: Vec<Evidence> = views.iter().map(seen).collect();
+    let part = |v: &Evidence| Evidence {
+        a: v.a.view((0, 0), (m, m)).into_owned(),
+        b: v.b.rows(0, m).into_owned(),
+    };
+    let beside: Vec<Evidence> = whole.iter().map(part).collect();
+    Some(gain(&whole, prior)?.total - gain(&beside, prior)?.total)
 }
 
 /// Mean loss of the coefficients' own errors where each view is predicted from the others, in nats at a
