@@ -114,7 +114,8 @@ impl DropoutReporter<'_> {
         bounded(points(self.fine, &at, self.span(step)), &step, self.region_given)
     }
 
-    /// Fits the step to these losses; `None` where it is no nearer to them than no step.
+    /// Fits the step to these losses; `None` where it is no nearer to them than no step, or where its
+    /// middle may as well be at the sensor.
     fn nearest(&self, step: Step, all: &[Point]) -> Option<Fitted> {
         let own = Fitted { step, std_error: [None; 3] };
         let fitted = fit(step, self.base, all).unwrap_or(own);
@@ -122,7 +123,11 @@ impl DropoutReporter<'_> {
             all.iter().map(|p| misfit(p, loss(p.x)).powi(2)).sum()
         };
         let follows = off(&|x| fitted.step.loss(x, self.base)) < off(&|_| self.base);
-        follows.then_some(fitted)
+        // The fit of a near foot to other losses runs on to a middle at the sensor.
+        let at_the_sensor = step.axis == Axis::Z
+            && step.width < 0.0
+            && fitted.step.middle < fitted.std_error[0].unwrap_or(0.0);
+        (follows && !at_the_sensor).then_some(fitted)
     }
 
     fn curve(&self, basis: &Basis, finding: &mut Finding) {
