@@ -11,7 +11,7 @@ use serde_json::Map;
 use super::Baseline;
 use crate::diagnose::finding::parameters::one;
 use crate::diagnose::noise::frame_means::velocity;
-use crate::diagnose::noise::in_time::{later, of_any_two};
+use crate::diagnose::noise::lagged::{later, of_any_two};
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::{ViewMean, nats};
@@ -212,7 +212,7 @@ impl LightLine {
         let mean = |at: f64, height: f64| {
             let variance =
                 covariance[(0, 0)] + at * (at * covariance[(1, 1)] - 2.0 * covariance[(0, 1)]);
-            ViewMean { value: height, std_error: variance.sqrt(), views: n as f64 - 1.0 }
+            ViewMean::new(height, variance.sqrt(), n as f64 - 1.0)
         };
         Some(LightLine {
             lift: mean(0.0, line[0] - darkest),

@@ -109,7 +109,7 @@ impl Half {
         let scatter: f64 = self.beyond.iter().map(|s| reach.dot(s).powi(2)).sum();
         let variance = (scatter * n / (n - 1.0)).max(reach.dot(weights));
         let value = weights.dot(&self.beta);
-        (n > 1.0).then_some(ViewMean { value, std_error: variance.sqrt(), views: n })
+        (n > 1.0).then_some(ViewMean::new(value, variance.sqrt(), n))
     }
 }
 
@@ -182,7 +182,7 @@ impl Halves {
             let scatter: f64 = beyond.iter().map(|s| s.dot(shape).powi(2)).sum();
             let std_error = (scatter * n / (n - 1.0)).max(square).sqrt() / square;
             let value = score.dot(shape) / square;
-            (n > 1.0 && square > 0.0).then_some(ViewMean { value, std_error, views: n })
+            (n > 1.0 && square > 0.0).then_some(ViewMean::new(value, std_error, n))
         };
         let common = of(&self.whole);
         Some(Shown {

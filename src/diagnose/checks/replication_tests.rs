@@ -117,7 +117,7 @@ fn halves_that_share_out_or_see_parts_do_not_contradict_each_other() {
 
 #[test]
 fn sizes_that_differ_do_not_agree() {
-    let size = |value, std_error| Some(ViewMean { value, std_error, views: 8.0 });
+    let size = |value, std_error| Some(ViewMean::new(value, std_error, 8.0));
     assert_eq!(agree([size(1.0, 0.1), size(1.2, 0.1)]), Some(true));
     assert_eq!(agree([size(1.0, 0.1), size(1.6, 0.1)]), Some(false));
     assert_eq!(agree([size(0.1, 0.1), size(0.1, 0.1)]), Some(false), "no half sees it");

@@ -5,7 +5,7 @@ use super::replication::agree;
 use crate::diagnose::edges::Edges;
 use crate::diagnose::edges::mixing::mean_share;
 use crate::diagnose::noise::expected_window;
-use crate::diagnose::noise::in_time::{later, of_any_two};
+use crate::diagnose::noise::lagged::{later, of_any_two};
 use crate::diagnose::noise::mixture::Mixture;
 use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::structure::Structure;

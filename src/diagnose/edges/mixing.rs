@@ -109,7 +109,7 @@ fn by_noise(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
     let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
     let std_error = (scatter.max(1.0) / sure).sqrt();
     let explained = value * sure.sqrt();
-    (n > 1.0 && sure > 0.0).then_some((ViewMean { value, std_error, views: n }, explained))
+    (n > 1.0 && sure > 0.0).then_some((ViewMean::new(value, std_error, n), explained))
 }
 
 /// Same for differences between two runs, which differ from view to view without a cause: includes the
@@ -117,7 +117,7 @@ fn by_noise(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
 fn between_runs(views: &[(f64, f64)]) -> Option<ViewMean> {
     let units: Vec<(f64, f64)> = views.iter().map(|(v, sure)| (*v, 1.0 / sure)).collect();
     let [value, std_error] = common_value(&units)?;
-    Some(ViewMean { value, std_error, views: views.len() as f64 })
+    Some(ViewMean::new(value, std_error, views.len() as f64))
 }
 
 /// Width of a footprint, mean share of it, and how well it explains the views.

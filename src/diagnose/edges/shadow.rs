@@ -181,7 +181,7 @@ pub fn bands_agree(sides: &[Sides], second: &[bool]) -> Option<bool> {
         let mine = sides.iter().zip(second).filter(|(_, s)| **s == which);
         let mine: Vec<Sides> = mine.map(|(sides, _)| *sides).collect();
         let Band { side, share: [value, std_error], .. } = band_of(&mine)?;
-        Some((side, ViewMean { value, std_error, views: mine.len() as f64 }))
+        Some((side, ViewMean::new(value, std_error, mine.len() as f64)))
     };
     let (first, second) = (half(false)?, half(true)?);
     Some(first.0 == second.0 && agree([Some(first.1), Some(second.1)])?)

@@ -6,8 +6,9 @@ use crate::diagnose::views::field::{CLIP_SIGMAS, Field};
 use crate::solve::plane_equations;
 
 /// Factor by which the variance must exceed that of the noise, which lacks correlation beyond a window's
-/// reach; heavy tails double the scatter of its size.
-const MUCH: f64 = 2.0;
+/// reach. Of 140 simulated recordings without jitter, with all kinds of other effects, the means of frames
+/// scatter by 0.95 of it and none by more than chance makes of 1.25.
+const MUCH: f64 = 1.25;
 
 /// Sum of squares of the values of one view.
 #[derive(Debug, Clone, Copy)]

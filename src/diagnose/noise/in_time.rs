@@ -1,5 +1,6 @@
 //! Errors that pixels repeat: in every view, in every frame of a view, and from frame to frame.
 
+use super::moderated::{Moderated, any_two, falling, last, next};
 use super::structure::Structure;
 use super::texture_finding::{Shared, TextureFinding};
 use super::view_mean::{ViewMean, nats, variance_px2};
@@ -50,7 +51,11 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     let mut found: Vec<TextureFinding> = found.map(|f| of_pixels(f, views)).into_iter().collect();
     // The pattern's error is common to the correlations of all views.
     let of_pattern = fixed.map_or(0.0, |m| m.std_error * mean_precision(views));
-    found.extend(beside(&beside_pattern(views, fixed), of_pattern, known, level));
+    let beside_it = beside_pattern(views, fixed);
+    // Beside a pattern, correlations err by more than the noise implies.
+    let alone = found.is_empty() && known_px == 0.0;
+    let of = if alone { Moderated::of(&beside_it, known) } else { Moderated::not(&beside_it) };
+    found.extend(beside(&of, of_pattern, known, level));
     found
 }
 
@@ -66,19 +71,19 @@ fn of_pixels(mut found: TextureFinding, views: &[Structure]) -> TextureFinding {
 
 /// Tests what frames of a view share beside the pattern; `of_pattern` is the standard error that it adds.
 fn beside(
-    views: &[Structure],
+    views: &Moderated<'_>,
     of_pattern: f64,
     known: &KnownTerms,
     level: f64,
 ) -> Vec<TextureFinding> {
     let mut found = Vec::new();
-    let Some(first) = ViewMean::of(views, |s| s.lagged[0]) else { return found };
+    let Some(first) = views.mean(next) else { return found };
     let first = first.and_error(of_pattern);
-    let first_error = first.std_error.max(by_chance(views));
+    let first_error = first.std_error.max(by_chance(views.views));
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
     let rho_known = known.parameter("temporal-correlation", "rho").unwrap_or(0.0);
-    let falling = ViewMean::of(views, |s| Some(s.lagged[0]? - later(s)?));
-    let Some((falling, still)) = falling.zip(still_beside(views)) else {
+    let falling = views.mean(falling);
+    let Some((falling, still)) = falling.zip(still_beside(views.views)) else {
         // With two frames per view, constant and slowly changing noise cannot be told apart.
         let p = first.p_above(frozen_known + rho_known);
         let more = first.value - frozen_known - rho_known;
@@ -94,10 +99,8 @@ fn beside(
     let alike = first.p_above(frozen_known) < level;
     let slowly = alike && p_falling < level;
     // Constant noise is whole at the longest lag, and at all lags where nothing fades.
-    let last = |s: &Structure| if slowly { s.lagged[2].or(s.lagged[1]) } else { of_any_two(s) };
-    let Some(standing) = ViewMean::of(views, last).map(|m| m.and_error(of_pattern)) else {
-        return found;
-    };
+    let standing = views.mean(if slowly { last } else { any_two });
+    let Some(standing) = standing.map(|m| m.and_error(of_pattern)) else { return found };
     let p_still = standing.p_above(frozen_known);
     let floor = if slowly { BESIDE_ANOTHER } else { 0.0 };
     let stands = p_still < level && still - frozen_known > floor;
@@ -127,20 +130,6 @@ fn beside(
         found.push(of_frames(names, [1.0, 3.0], parameter, still, evidence));
     }
     found
-}
-
-/// Mean correlation of frames two or three apart: of four frames, two pairs and one.
-pub fn later(s: &Structure) -> Option<f64> {
-    let (two, three) = (s.lagged[1]?, s.lagged[2]);
-    Some(three.map_or(two, |three| (2.0 * two + three) / 3.0))
-}
-
-/// Mean correlation of any two frames, each pair counted once: of four frames, three pairs are successive.
-pub fn of_any_two(s: &Structure) -> Option<f64> {
-    let next = s.lagged[0]?;
-    let Some(rest) = later(s) else { return Some(next) };
-    let share = if s.lagged[2].is_some() { 1.0 / 2.0 } else { 1.0 / 3.0 };
-    Some(next + share * (rest - next))
 }
 
 /// Standard error of the correlation of white noise: one over the root of the number of pixels. A few views

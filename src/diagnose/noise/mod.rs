@@ -5,8 +5,10 @@ pub mod frame_series;
 pub mod frame_tilts;
 pub mod frames;
 pub mod in_time;
+pub mod lagged;
 pub mod lines;
 pub mod mixture;
+pub mod moderated;
 pub mod moments;
 pub mod outliers;
 pub mod pairs;
@@ -15,6 +17,7 @@ pub mod skewness;
 pub mod some_views;
 pub mod still;
 pub mod structure;
+pub mod structures;
 pub mod tail_counts;
 pub mod tails;
 mod tails_of_some;
@@ -30,7 +33,8 @@ use frame_means::{frame_means, jitter_px2};
 use frame_tilts::frame_tilts;
 use frames::{flicker, unequal};
 use in_time::{FIXED_PATTERN, in_time, pattern_px2};
-use pairs::{REACH_PX, window_of};
+use moderated::{Moderated, near};
+use pairs::REACH_PX;
 use some_views::some_views;
 use still::Still;
 use structure::Structure;
@@ -112,7 +116,7 @@ fn textures_of_some(
         (
             &["frozen-noise", "temporal-correlation"],
             &|s| s.neighbour_correlation.and(s.beside_pattern(beside)[0]),
-            &|s| s.lagged_error(beside),
+            &|s| s.lagged_error_beside(beside),
             in_time,
         ),
         (
@@ -169,7 +173,7 @@ pub(in crate::diagnose) fn window(
         return Some(found([0.0, length], parameters, size, p, nats));
     }
     // A window for only part of the noise shows in a test against independent neighbours.
-    let near = ViewMean::of(views, |s| s.neighbour_correlation)?;
+    let near = Moderated::of(views, known).mean(near)?;
     let p = near.p_above(0.0);
     if expected > 1.0 || p >= level {
         return None;
@@ -177,8 +181,11 @@ pub(in crate::diagnose) fn window(
     let (size, nats) = (near.value.sqrt(), nats(&near, 0.0));
     // Where side and share cannot be separated: the window that all noise would pass through.
     let all = || {
-        let side = window_of(near.value);
-        let std_error = window_of(near.value + near.std_error) - side + 0.2 * (side - 1.0);
+        let side_of = |sum: f64| sum.max(1.0).sqrt();
+        let sum = ViewMean::of(views, |s| s.near_sum);
+        let [value, error] = sum.map_or([1.0, 0.0], |m| [m.value, m.std_error]);
+        let side = side_of(value);
+        let std_error = side_of(value + error) - side + 0.2 * (side - 1.0);
         one("length_px", side.max(length), std_error)
     };
     let reach = part.map_or(REACH_PX as f64, |w| w.length[0]);
@@ -200,6 +207,9 @@ pub const ROW_NOISE: &str = "row-noise";
 
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let variance = variance_px2(views);
+    // The noise of known rows adds to the error of what they share.
+    let means =
+        if known.has(ROW_NOISE) { Moderated::not(views) } else { Moderated::of(views, known) };
     let known_px = known.parameter(ROW_NOISE, "sigma_px").unwrap_or(0.0);
     let line = |families, statistic, axis, expected_px2, words| Shared {
         families,
@@ -236,12 +246,12 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
             "a fine pattern over the picture is the same in all views",
         ),
         (
-            ViewMean::of_lines(views, 0),
+            means.mean_of_lines(0),
             line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),
             1.0,
         ),
         (
-            ViewMean::of_lines(views, 1),
+            means.mean_of_lines(1),
             line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
             1.0,
         ),

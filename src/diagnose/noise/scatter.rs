@@ -3,7 +3,8 @@
 use super::lines::LearntLines;
 use super::skewness::skewness;
 use super::still::beside_bias;
-use super::structure::{Structure, structures};
+use super::structure::Structure;
+use super::structures::structures;
 use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
 use super::{ROW_NOISE, further_textures, texture_findings, window};

@@ -2,12 +2,10 @@
 //!
 //! Every statistic is one number per view, so the views are the sample.
 
-use rayon::prelude::*;
-
 use super::frame_series::{Jitter, Squares};
 use super::moments::Moments;
-use super::pairs::{NEIGHBOURS, Pairs, REACH_PX};
-use super::still::{KeptPattern, Still, beside_bias, still};
+use super::pairs::{EFFECTIVE_NEIGHBOURS, Lines, NEIGHBOURS, Pairs};
+use super::still::Still;
 use super::tail_counts::{MIN_READINGS, TailCounts};
 use super::texture::{
     FAR, Filled, PROFILE_LAGS, SHORT_LINE, area, changes, covariance, frame_log_variance,
@@ -29,8 +27,10 @@ pub struct Structure {
     pub window_px: Option<f64>,
     /// Correlation of the changes between frames at lags of 1, 2, 3, ... px, beyond that at far lags.
     pub correlation_profile: Option<[f64; PROFILE_LAGS]>,
-    /// Mean correlation of near pixels in the changes between frames.
+    /// Mean correlation of near pixels in the changes between frames, the nearest weighted most.
     pub neighbour_correlation: Option<f64>,
+    /// Sum of the correlation over a pixel and all near ones.
+    pub near_sum: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
     pub lagged: [Option<f64>; 3],
     /// Log ratio of each of the first frames' variance to that of the others.
@@ -83,6 +83,10 @@ impl Structure {
         Some([disparity, disparity - 6.0 * self.relative_sigma])
     }
 
+    pub fn take_lines(&mut self, lines: Lines) {
+        (self.row_px2, self.column_px2, self.line_pairs) = (lines.row, lines.column, lines.pairs);
+    }
+
     /// Standard error of the share of the variance common to rows (columns: 1) where there is none: that of
     /// the mean of so many products of two distant pixels. With a window of side W, the correlation of the
     /// products sums to W along the line at either end, and across it to the sum of the squared correlation.
@@ -98,30 +102,11 @@ impl Structure {
         (self.line_error(axis) * self.variance_px2.max(variance_px2).max(1e-12)).powi(-2)
     }
 
-    /// Standard error of the frames' correlation where they share nothing but a pattern of this variance,
-    /// which varies by chance over a view's pixels.
-    pub fn lagged_error(&self, pattern_px2: f64) -> f64 {
-        let changes = self.lagged.iter().flatten().count() as f64;
-        let (share, left) = self.pattern_share(pattern_px2);
-        let of_pattern = share / left * (2.0 / self.pixels).sqrt();
-        (self.repeats() / (self.pixels * changes)).sqrt().hypot(of_pattern)
-    }
-
-    /// Correlation of a pixel with itself 1, 2 and 3 frames later, without a pattern of this variance.
-    pub fn beside_pattern(&self, pattern_px2: f64) -> [Option<f64>; 3] {
-        let (share, left) = self.pattern_share(pattern_px2);
-        self.lagged.map(|c| Some((c? - share) / left))
-    }
-
-    /// Share of a pattern in the variance, and the rest.
-    fn pattern_share(&self, pattern_px2: f64) -> (f64, f64) {
-        let share = (pattern_px2.max(0.0) / self.variance_px2.max(1e-12)).min(LARGEST_PATTERN);
-        (share, 1.0 - share)
-    }
-
-    /// Largest standard error of the neighbours' correlation where there is none: that of a single change.
+    /// Standard error of the neighbours' correlation where there is none.
     pub fn neighbour_error(&self) -> f64 {
-        (2.0 / (NEIGHBOURS as f64 * self.pixels)).sqrt()
+        // Four frames make three orthogonal changes, fewer make one.
+        let changes = if self.lagged[2].is_some() { 3.0 } else { 1.0 };
+        (2.0 / (EFFECTIVE_NEIGHBOURS * self.pixels * changes)).sqrt()
     }
 
     /// Variance inflation of a mean and of a log variance by row noise, beyond that of pixels with this
@@ -159,24 +144,12 @@ impl Structure {
     }
 }
 
-/// Largest share of a pattern in the variance: beyond it the rest of a view's noise is unknown.
-const LARGEST_PATTERN: f64 = 0.95;
-
-/// Measures all views. `bias` is their known bias, px by view and pixel (or empty).
-pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Vec<Structure> {
-    let views = beside_bias(fields, bias);
-    let mut all: Vec<Structure> = views.par_iter().map(|(f, b)| structure(f, b)).collect();
-    for (s, still) in all.iter_mut().zip(still(&views, kept)) {
-        s.still = still;
-    }
-    all
-}
-
-fn structure(field: &Field, bias: &[f32]) -> Structure {
-    let mut s = Structure::default();
+/// A view's structure, and what its lines share by pairs in short blocks.
+pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
+    let (mut s, mut short) = (Structure::default(), Lines::default());
     let frames: Vec<Vec<f32>> =
         field.first.iter().map(|r| without_outliers(&high_passed(field, r, bias))).collect();
-    let Some(first) = frames.first() else { return s };
+    let Some(first) = frames.first() else { return (s, short) };
     s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
     let level: Vec<Vec<f32>> =
@@ -190,10 +163,21 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     let pairs: Option<Vec<Pairs>> =
         changes(&images).iter().map(|change| Pairs::of(change, field.width)).collect();
     if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
-        let all = |of: fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
-        (s.row_px2, s.column_px2) = (all(|p| p.row), all(|p| p.column));
-        s.line_pairs = [0, 1].map(|k| pairs.iter().map(|p| p.line_pairs[k]).sum());
-        s.neighbour_correlation = all(|p| Some(p.near / beside_lines(p.power, [p.row, p.column])));
+        let all = |of: &dyn Fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
+        let [long, by_short] = [0, 1].map(|k| Lines {
+            row: all(&|p| p.lines[k].row),
+            column: all(&|p| p.lines[k].column),
+            pairs: [0, 1].map(|axis| pairs.iter().map(|p| p.lines[k].pairs[axis]).sum()),
+        });
+        s.take_lines(long);
+        short = by_short;
+        let correlation = |k: usize| {
+            let of =
+                |p: &Pairs| p.near[k] / beside_lines(p.power, [p.lines[0].row, p.lines[0].column]);
+            all(&|p| Some(of(p)))
+        };
+        s.neighbour_correlation = correlation(0);
+        s.near_sum = correlation(1).map(|rho| 1.0 + NEIGHBOURS as f64 * rho);
         s.correlation_profile =
             correlation_profile(&changes(&frames), field.width, [s.row_px2, s.column_px2]);
     }
@@ -202,14 +186,12 @@ fn structure(field: &Field, bias: &[f32]) -> Structure {
     let window = area(&moving(&frames, s.lagged[0]), field.width, shares);
     s.window_px = Some(window.sqrt());
     // A window for only part of the noise is too weak to see lag by lag.
-    let box_px = (2.0 * REACH_PX as f64 + 1.0).powi(2);
-    let near = 1.0 + (box_px - 1.0) * s.neighbour_correlation.unwrap_or(0.0);
-    let of_mean_px2 = frame_mean_px2(field, &s, window.max(near));
+    let of_mean_px2 = frame_mean_px2(field, &s, window.max(s.near_sum.unwrap_or(1.0)));
     s.jitter = Jitter::of(field, of_mean_px2);
     let columns = (s.pixels / rows(field)).max(1.0);
     let of_columns_px2 = s.column_px2.unwrap_or(0.0).max(0.0) / columns;
     s.tilts = Squares::of_slopes(field, of_mean_px2 + of_columns_px2);
-    s
+    (s, short)
 }
 
 /// Variance of a frame's mean due to the noise of its pixels and rows, px^2.

@@ -9,10 +9,17 @@ use crate::stats::{MAD_TO_SIGMA, mean, median, student_upper};
 pub struct ViewMean {
     pub value: f64,
     pub std_error: f64,
+    /// Degrees of freedom of the standard error.
+    pub freedom: f64,
     pub views: f64,
 }
 
 impl ViewMean {
+    /// A mean whose standard error is that of the views' scatter.
+    pub fn new(value: f64, std_error: f64, views: f64) -> Self {
+        ViewMean { value, std_error, freedom: views - 1.0, views }
+    }
+
     /// Mean of a statistic over the views that have it.
     pub fn of(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Self> {
         let values: Vec<(f64, f64)> = views
@@ -20,17 +27,6 @@ impl ViewMean {
             .filter_map(|s| Some((value(s).filter(|v| v.is_finite())?, s.pixels)))
             .collect();
         ViewMean::weighed(&values)
-    }
-
-    /// Mean of the variance common to rows (columns: 1), px^2. Views are weighted by their standard error, as
-    /// the number of pairs in a line grows with its length squared.
-    pub fn of_lines(views: &[Structure], axis: usize) -> Option<Self> {
-        let variance = variance_px2(views);
-        let of = |s: &Structure| {
-            let px2 = [s.row_px2, s.column_px2][axis].filter(|px2| px2.is_finite());
-            Some((px2?, s.line_size(axis, variance)))
-        };
-        ViewMean::weighed(&views.iter().filter_map(of).collect::<Vec<_>>())
     }
 
     /// Mean of what each view shares with all the others. A pair of views counts in two of the values, so
@@ -51,7 +47,7 @@ impl ViewMean {
             return None;
         }
         let (value, std_error) = huber(&weighted);
-        Some(ViewMean { value, std_error, views: weighted.len() as f64 })
+        Some(ViewMean::new(value, std_error, weighted.len() as f64))
     }
 
     /// Effective number of pixels of a mean over the views, if a view's pixels lie within
@@ -81,6 +77,14 @@ impl ViewMean {
         nats.is_finite().then_some(nats)
     }
 
+    /// Standard error of the mean of these values by their own `errors`.
+    pub fn implied(values: &[(f64, f64)], errors: &[f64]) -> f64 {
+        let weight = Weight::of(values);
+        let weights = || values.iter().map(|v| if v.1 > 0.0 { weight.at(v.1) } else { 0.0 });
+        let square: f64 = weights().zip(errors).map(|(w, error)| (w * error).powi(2)).sum();
+        square.sqrt() / weights().sum::<f64>()
+    }
+
     /// Adds a standard error common to all views.
     pub fn and_error(self, common: f64) -> Self {
         ViewMean { std_error: self.std_error.hypot(common), ..self }
@@ -89,7 +93,7 @@ impl ViewMean {
     /// One-sided p-value of a mean this far above `expected`, by Student's t.
     pub fn p_above(&self, expected: f64) -> f64 {
         let t = (self.value - expected) / self.std_error.max(1e-12 * self.value.abs()).max(1e-300);
-        student_upper(t, self.views - 1.0).max(1e-300)
+        student_upper(t, self.freedom).max(1e-300)
     }
 
     /// Same below `expected`.

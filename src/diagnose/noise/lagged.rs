@@ -1,0 +1,48 @@
+//! Correlation of a pixel with itself in later frames, and its standard error.
+
+use super::structure::Structure;
+
+/// Largest share of a pattern in the variance: beyond it the rest of a view's noise is unknown.
+const LARGEST_PATTERN: f64 = 0.95;
+
+/// Mean correlation of frames two or three apart: of four frames, two pairs and one.
+pub fn later(s: &Structure) -> Option<f64> {
+    let (two, three) = (s.lagged[1]?, s.lagged[2]);
+    Some(three.map_or(two, |three| (2.0 * two + three) / 3.0))
+}
+
+/// Mean correlation of any two frames, each pair counted once: of four frames, three pairs are successive.
+pub fn of_any_two(s: &Structure) -> Option<f64> {
+    let next = s.lagged[0]?;
+    let Some(rest) = later(s) else { return Some(next) };
+    let share = if s.lagged[2].is_some() { 1.0 / 2.0 } else { 1.0 / 3.0 };
+    Some(next + share * (rest - next))
+}
+
+impl Structure {
+    /// Standard error of the mean correlation of so many `pairs` of frames that share nothing.
+    pub fn lagged_error(&self, pairs: f64) -> f64 {
+        (self.repeats() / (self.pixels * pairs)).sqrt()
+    }
+
+    /// Same of successive frames beside a pattern of this variance, which varies by chance over a view's
+    /// pixels.
+    pub fn lagged_error_beside(&self, pattern_px2: f64) -> f64 {
+        let changes = self.lagged.iter().flatten().count() as f64;
+        let (share, left) = self.pattern_share(pattern_px2);
+        let of_pattern = share / left * (2.0 / self.pixels).sqrt();
+        self.lagged_error(changes).hypot(of_pattern)
+    }
+
+    /// Correlation of a pixel with itself 1, 2 and 3 frames later, without a pattern of this variance.
+    pub fn beside_pattern(&self, pattern_px2: f64) -> [Option<f64>; 3] {
+        let (share, left) = self.pattern_share(pattern_px2);
+        self.lagged.map(|c| Some((c? - share) / left))
+    }
+
+    /// Share of a pattern in the variance, and the rest.
+    fn pattern_share(&self, pattern_px2: f64) -> (f64, f64) {
+        let share = (pattern_px2.max(0.0) / self.variance_px2.max(1e-12)).min(LARGEST_PATTERN);
+        (share, 1.0 - share)
+    }
+}
