@@ -5,10 +5,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::diagnose::views::field::{CLIP_SIGMAS, Field};
 use crate::solve::plane_equations;
 
-/// Factor by which the variance must exceed that of the noise, which lacks correlation beyond a window's
-/// reach. Of 140 simulated recordings without jitter, with all kinds of other effects, the means of frames
-/// scatter by 0.95 of it and none by more than chance makes of 1.25.
-const MUCH: f64 = 1.25;
+/// Factor by which a variance must exceed that of the noise, which lacks correlation beyond a window's reach;
+/// heavy tails double the scatter of its size.
+pub const MUCH: f64 = 2.0;
 
 /// Sum of squares of the values of one view.
 #[derive(Debug, Clone, Copy)]
@@ -31,21 +30,21 @@ pub struct Excess {
     /// Standard deviation beyond the noise, and its standard error.
     pub size: f64,
     pub std_error: f64,
-    /// P-value for noise of twice the known variance.
+    /// P-value for noise of `much` times the known variance.
     pub p: f64,
     pub nats: f64,
 }
 
 impl Excess {
-    /// Tests all views together at this level.
-    pub fn of(views: impl Iterator<Item = Squares>, level: f64) -> Option<Self> {
+    /// Tests at this level whether all views together scatter by more than `much` times what is expected.
+    pub fn of(views: impl Iterator<Item = Squares>, much: f64, level: f64) -> Option<Self> {
         let (mut ratio, mut freedom, mut beyond) = (0.0, 0.0, 0.0);
         for s in views {
             ratio += s.sum / s.expected;
             freedom += s.freedom;
             beyond += s.sum - s.freedom * s.expected;
         }
-        let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(ratio / MUCH)).max(1e-300);
+        let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(ratio / much)).max(1e-300);
         let (size, larger) = ((beyond / freedom).sqrt(), ratio / freedom);
         (p < level && beyond > 0.0).then(|| Excess {
             size,

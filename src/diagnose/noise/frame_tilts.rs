@@ -1,6 +1,6 @@
 //! Frames whose slope over the picture changes by more than the pixels' noise explains.
 
-use super::frame_series::{Excess, Squares};
+use super::frame_series::{Excess, MUCH, Squares};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
@@ -11,7 +11,7 @@ use crate::terms::{Axis, Statistic};
 pub fn frame_tilts(views: &[Structure], jitter_px2: f64, level: f64) -> Option<TextureFinding> {
     let tilts = views.iter().filter_map(|s| s.tilts);
     let beside = tilts.map(|t| Squares { expected: t.expected + jitter_px2, ..t });
-    let Excess { size, std_error, p, nats } = Excess::of(beside, level)?;
+    let Excess { size, std_error, p, nats } = Excess::of(beside, MUCH, level)?;
     Some(TextureFinding {
         parameters: one("sigma_px", size, std_error),
         size_sigma: size / variance_px2(views).max(1e-12).sqrt(),

@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use super::frame_series::{Excess, Squares};
+use super::frame_series::{Excess, MUCH, Squares};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats};
@@ -50,7 +50,8 @@ pub fn flicker(views: &[Structure], level: f64) -> Option<TextureFinding> {
         let measured = n > 1.0 && expected.is_finite();
         measured.then_some(Squares { sum, freedom: n - 1.0, expected })
     };
-    let Excess { size, std_error, p, nats } = Excess::of(views.iter().filter_map(squares), level)?;
+    let Excess { size, std_error, p, nats } =
+        Excess::of(views.iter().filter_map(squares), MUCH, level)?;
     Some(TextureFinding {
         parameters: one("spread_of_log_variance", size, std_error),
         size_sigma: (0.5 * size).exp() - 1.0,

@@ -16,7 +16,7 @@ fn of_five(seed: u64, add: impl Fn(&mut Structure)) -> Vec<Structure> {
         let far = 30f64.powf(f64::from(number) / 14.0);
         s.variance_px2 *= far;
         s.row_px2 = s.row_px2.map(|px2| px2 * far);
-        s.neighbour_correlation = Some(0.0);
+        (s.neighbour_correlation, s.near_error) = (Some(0.0), f64::INFINITY);
         if (5..10).contains(&number) {
             add(s);
         }

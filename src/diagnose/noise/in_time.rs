@@ -52,8 +52,9 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     // The pattern's error is common to the correlations of all views.
     let of_pattern = fixed.map_or(0.0, |m| m.std_error * mean_precision(views));
     let beside_it = beside_pattern(views, fixed);
-    // Beside a pattern, correlations err by more than the noise implies.
-    let alone = found.is_empty() && known_px == 0.0;
+    // Beside a pattern or known correlations, these err by more than the noise implies.
+    let correlated = ["frozen-noise", "temporal-correlation"].iter().any(|id| known.has(id));
+    let alone = found.is_empty() && known_px == 0.0 && !correlated;
     let of = if alone { Moderated::of(&beside_it, known) } else { Moderated::not(&beside_it) };
     found.extend(beside(&of, of_pattern, known, level));
     found

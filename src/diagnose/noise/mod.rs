@@ -122,7 +122,7 @@ fn textures_of_some(
         (
             &["spatial-correlation"],
             &|s| s.neighbour_correlation,
-            &Structure::neighbour_error,
+            &|s| s.near_error,
             |views, known, level| window(views, known, level).into_iter().collect(),
         ),
     ];

@@ -18,7 +18,7 @@ use crate::stats::mean;
 type Implied = fn(&Structure) -> Option<[f64; 2]>;
 
 pub fn near(s: &Structure) -> Option<[f64; 2]> {
-    Some([s.neighbour_correlation?, s.neighbour_error()])
+    Some([s.neighbour_correlation?, s.near_error])
 }
 
 /// Correlation of successive frames.
@@ -119,18 +119,21 @@ impl Prior {
         let variance = logs.iter().map(|l| (l - level).powi(2)).sum::<f64>() / (n - 1.0);
         let by_chance = mean(ratios.iter().map(|r| trigamma(0.5 * r[1])))?;
         let total: f64 = ratios.iter().map(|r| r[1]).sum();
-        // No more than the degrees of freedom that show it.
-        let freedom = (2.0 * inverse_trigamma(variance - by_chance)).min(total);
+        // No more than the degrees of freedom that the others show it with.
+        let others = total * (n - 1.0) / n;
+        let freedom = (2.0 * inverse_trigamma(variance - by_chance)).min(others);
         // Views scatter by no less than their noise.
         Some(Prior { factor: (level + bias(freedom)).exp().max(1.0), freedom })
     }
 
-    /// The mean, whose error by the noise is `implied`, with a moderated error.
+    /// The mean, whose error by the noise is `implied`, with a moderated error. Four or five statistics cannot
+    /// show that one of them scatters by more than the others, so its own scatter is the least.
     fn moderate(&self, m: ViewMean, implied: f64) -> ViewMean {
         let freedom = m.freedom + self.freedom;
-        let own = m.freedom * m.std_error.powi(2);
-        let prior = self.freedom * self.factor * implied.powi(2);
-        ViewMean { std_error: ((own + prior) / freedom).sqrt(), freedom, ..m }
+        let own = m.std_error.powi(2);
+        let prior = self.factor * implied.powi(2);
+        let both = (m.freedom * own + self.freedom * prior) / freedom;
+        ViewMean { std_error: both.max(own).sqrt(), freedom, ..m }
     }
 }
 

@@ -13,6 +13,7 @@ fn views(n: usize, factors: [f64; 5], rng: &mut Stream) -> Vec<Structure> {
             variance_px2: 0.04,
             lagged: [Some(0.0); 3],
             line_pairs: [2e5; 2],
+            near_error: 1e-3,
             ..Structure::default()
         };
         let mut off = |k: usize, error: f64| Some(factors[k] * error * normal());
@@ -20,7 +21,7 @@ fn views(n: usize, factors: [f64; 5], rng: &mut Stream) -> Vec<Structure> {
         s.column_px2 = off(1, 0.04 * s.line_error(1));
         s.lagged =
             [off(2, s.lagged_error(3.0)), off(3, s.lagged_error(2.0)), off(3, s.lagged_error(1.0))];
-        s.neighbour_correlation = off(4, s.neighbour_error());
+        s.neighbour_correlation = off(4, s.near_error);
         s
     };
     (0..n).map(view).collect()
@@ -50,20 +51,27 @@ fn clean_recordings_are_below_a_level_as_often_as_it_says() {
         let below = beyond(factors);
         assert!(below.iter().all(|b| (0.0003..0.002).contains(b)), "{below:?} at {factors:?}");
     }
-    // Where one statistic alone scatters by more than its noise, it is wrong more often.
-    let below = beyond([1.0, 1.0, 1.0, 1.0, 3.0]);
-    assert!(below[0] < 0.01 && below[1] < 0.002, "{below:?}");
 }
 
-/// Half of what twelve views show at 1e-3 by Student's t with eleven degrees of freedom is at 4.0 errors; with
-/// sixty, at 3.2.
+/// A statistic that alone scatters by more than its noise is told up to three times as often as the level says;
+/// the others are not.
+#[test]
+fn one_statistic_that_scatters_more_is_told_little_more_often() {
+    for factor in [1.3, 1.7, 3.0] {
+        let [near, rows] = beyond([1.0, 1.0, 1.0, 1.0, factor]);
+        assert!(near < 0.004 && rows < 0.002, "{near}, {rows} at {factor}");
+    }
+}
+
+/// A mean of 3.7 errors is beyond 1e-3 in 41 % of recordings by Student's t with eleven degrees of freedom, and in
+/// 57 % by the moderated one (114 +- 7 of 200).
 #[test]
 fn a_mean_beyond_its_noise_is_seen_with_fewer_errors() {
     let mut rng = Seed(3).stream("noise/moderated/power");
     let mut seen = [0; 2];
     for _ in 0..200 {
         let mut views = views(12, [1.0; 5], &mut rng);
-        let error = views[0].neighbour_error() / 12f64.sqrt();
+        let error = views[0].near_error / 12f64.sqrt();
         for s in &mut views {
             s.neighbour_correlation = s.neighbour_correlation.map(|rho| rho + 3.7 * error);
         }
@@ -74,7 +82,7 @@ fn a_mean_beyond_its_noise_is_seen_with_fewer_errors() {
             *seen += i32::from(of.mean(near).expect("a mean").p_above(0.0) < 1e-3);
         }
     }
-    assert!(seen[0] > 125 && seen[1] < 90, "{seen:?} of 200");
+    assert!(seen[0] > 93 && seen[0] > seen[1] + 15, "{seen:?} of 200");
 }
 
 /// pi^2 / 6 and pi^2 / 2 (Abramowitz and Stegun 6.4.2, 6.4.4).

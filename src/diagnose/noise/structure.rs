@@ -4,7 +4,7 @@
 
 use super::frame_series::{Jitter, Squares};
 use super::moments::Moments;
-use super::pairs::{EFFECTIVE_NEIGHBOURS, Lines, NEIGHBOURS, Pairs};
+use super::pairs::{Lines, NEIGHBOURS, Pairs};
 use super::still::Still;
 use super::tail_counts::{MIN_READINGS, TailCounts};
 use super::texture::{
@@ -29,6 +29,8 @@ pub struct Structure {
     pub correlation_profile: Option<[f64; PROFILE_LAGS]>,
     /// Mean correlation of near pixels in the changes between frames, the nearest weighted most.
     pub neighbour_correlation: Option<f64>,
+    /// Its standard error in white noise.
+    pub near_error: f64,
     /// Sum of the correlation over a pixel and all near ones.
     pub near_sum: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later.
@@ -102,13 +104,6 @@ impl Structure {
         (self.line_error(axis) * self.variance_px2.max(variance_px2).max(1e-12)).powi(-2)
     }
 
-    /// Standard error of the neighbours' correlation where there is none.
-    pub fn neighbour_error(&self) -> f64 {
-        // Four frames make three orthogonal changes, fewer make one.
-        let changes = if self.lagged[2].is_some() { 3.0 } else { 1.0 };
-        (2.0 / (EFFECTIVE_NEIGHBOURS * self.pixels * changes)).sqrt()
-    }
-
     /// Variance inflation of a mean and of a log variance by row noise, beyond that of pixels with this
     /// `correlation`, for a shape that varies by row. All pixels along a row share its error, on a
     /// target about as wide as high.
@@ -177,6 +172,8 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
             all(&|p| Some(of(p)))
         };
         s.neighbour_correlation = correlation(0);
+        let variance: f64 = pairs.iter().map(|p| p.near_variance).sum();
+        s.near_error = variance.sqrt() / pairs.len() as f64;
         s.near_sum = correlation(1).map(|rho| 1.0 + NEIGHBOURS as f64 * rho);
         s.correlation_profile =
             correlation_profile(&changes(&frames), field.width, [s.row_px2, s.column_px2]);

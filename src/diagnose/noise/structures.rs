@@ -22,7 +22,7 @@ pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Ve
     all
 }
 
-/// P-value from which near pixels count as independent.
+/// One-sided p-value, on either side, from which near pixels count as independent.
 const INDEPENDENT: f64 = 0.05;
 
 fn is_without_window(views: &[Structure]) -> bool {

@@ -182,7 +182,7 @@ fn huber(values: &[(f64, f64)]) -> (f64, f64) {
 /// Evidence, in nats, for a mean that differs from `expected`.
 pub fn nats(m: &ViewMean, expected: f64) -> f64 {
     let t = (m.value - expected) / m.std_error.max(1e-9);
-    student(0.5 * t * t, m.views)
+    student(0.5 * t * t, m.freedom + 1.0)
 }
 
 /// Mean variance of the first frames' high-passed residuals, px^2.
