@@ -55,7 +55,8 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     // Beside a pattern or known correlations, these err by more than the noise implies.
     let correlated = ["frozen-noise", "temporal-correlation"].iter().any(|id| known.has(id));
     let alone = found.is_empty() && known_px == 0.0 && !correlated;
-    let of = if alone { Moderated::of(&beside_it, known) } else { Moderated::not(&beside_it) };
+    let of =
+        if alone { Moderated::of(&beside_it, known) } else { Moderated::by_scatter(&beside_it) };
     found.extend(beside(&of, of_pattern, known, level));
     found
 }

@@ -208,8 +208,11 @@ pub const ROW_NOISE: &str = "row-noise";
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let variance = variance_px2(views);
     // The noise of known rows adds to the error of what they share.
-    let means =
-        if known.has(ROW_NOISE) { Moderated::not(views) } else { Moderated::of(views, known) };
+    let means = if known.has(ROW_NOISE) {
+        Moderated::by_scatter(views)
+    } else {
+        Moderated::of(views, known)
+    };
     let known_px = known.parameter(ROW_NOISE, "sigma_px").unwrap_or(0.0);
     let line = |families, statistic, axis, expected_px2, words| Shared {
         families,

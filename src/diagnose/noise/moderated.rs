@@ -26,10 +26,15 @@ pub fn next(s: &Structure) -> Option<[f64; 2]> {
     Some([s.lagged[0]?, s.lagged_error(pairs(s, 1))])
 }
 
-/// By how much it exceeds that of frames further apart.
+/// Correlation of frames further apart.
+fn further(s: &Structure) -> Option<[f64; 2]> {
+    Some([later(s)?, s.lagged_error(pairs(s, 2) + pairs(s, 3))])
+}
+
+/// By how much the first exceeds the second.
 pub fn falling(s: &Structure) -> Option<[f64; 2]> {
-    let later_error = s.lagged_error(pairs(s, 2) + pairs(s, 3));
-    Some([s.lagged[0]? - later(s)?, s.lagged_error(pairs(s, 1)).hypot(later_error)])
+    let ([near, near_error], [far, far_error]) = (next(s)?, further(s)?);
+    Some([near - far, near_error.hypot(far_error)])
 }
 
 /// Correlation of frames as far apart as there are.
@@ -59,8 +64,7 @@ pub struct Moderated<'a> {
 
 impl<'a> Moderated<'a> {
     pub fn of(views: &'a [Structure], known: &KnownTerms) -> Self {
-        let later: Implied = |s| Some([later(s)?, s.lagged_error(pairs(s, 2) + pairs(s, 3))]);
-        let mut all: Vec<Implied> = vec![|s| of_lines(s, 0), |s| of_lines(s, 1), next, later];
+        let mut all: Vec<Implied> = vec![|s| of_lines(s, 0), |s| of_lines(s, 1), next, further];
         // Through a window, neighbours scatter by more than those of white noise.
         all.extend((expected_window(known) == 1.0).then_some(near as Implied));
         let ratios: Vec<[f64; 2]> = all.iter().filter_map(|of| scatter(views, *of)).collect();
@@ -68,7 +72,7 @@ impl<'a> Moderated<'a> {
     }
 
     /// Means with the errors of the views' scatter alone.
-    pub fn not(views: &'a [Structure]) -> Self {
+    pub fn by_scatter(views: &'a [Structure]) -> Self {
         Moderated { views, prior: None }
     }
 

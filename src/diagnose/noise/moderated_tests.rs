@@ -77,7 +77,7 @@ fn a_mean_beyond_its_noise_is_seen_with_fewer_errors() {
         }
         for (seen, of) in seen
             .iter_mut()
-            .zip([Moderated::of(&views, &KnownTerms::default()), Moderated::not(&views)])
+            .zip([Moderated::of(&views, &KnownTerms::default()), Moderated::by_scatter(&views)])
         {
             *seen += i32::from(of.mean(near).expect("a mean").p_above(0.0) < 1e-3);
         }

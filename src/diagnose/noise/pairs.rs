@@ -20,7 +20,7 @@ pub const REACH_PX: usize = 4;
 const OUTER_WEIGHT: f64 = 0.25;
 /// Lengths of a line's blocks, px. Pixels of touching blocks may share a window; where the noise has none,
 /// the short ones keep more pairs.
-pub const BLOCKS_PX: [usize; 2] = [16, 4];
+const BLOCKS_PX: [usize; 2] = [16, 4];
 /// Fewest pairs for an estimate.
 const MIN_PAIRS: f64 = 1000.0;
 
@@ -62,21 +62,28 @@ impl Pairs {
         // times the leverage of the two pixels on each other. That averages three over the number of pixels
         // for neighbours, as for a pixel on itself.
         let taken = power + beside.products / pixels;
-        let of_lines =
-            |block: usize, count: usize, length: usize, at: &dyn Fn(usize, usize) -> usize| {
-                let (mut sum, mut leverage) = (Sum::default(), 0.0);
-                for line in 0..count {
-                    let pixels = (0..length).map(|k| at(line, k));
-                    sum = sum.and(along(pixels.clone().map(|i| f64::from(level[i])), block));
-                    leverage += plane.leverage_along(&level, pixels, block);
+        let of_lines = |count: usize, length: usize, at: &dyn Fn(usize, usize) -> usize| {
+            let mut sums = [(Sum::default(), 0.0); 2];
+            for line in 0..count {
+                let pixels = (0..length).map(|k| at(line, k));
+                let products = along(pixels.clone().map(|i| f64::from(level[i])));
+                let leverage = plane.leverage_along(&level, pixels);
+                for (k, (sum, leverages)) in sums.iter_mut().enumerate() {
+                    *sum = sum.and(products[k]);
+                    *leverages += leverage[k];
                 }
+            }
+            sums.map(|(sum, leverage)| {
                 let products = (sum.products + taken * leverage) / sum.pairs;
                 ((sum.pairs >= MIN_PAIRS).then_some(products), sum.pairs)
-            };
-        let lines = BLOCKS_PX.map(|block| {
-            let (row, in_rows) = of_lines(block, height, width, &|line, k| line * width + k);
-            let (column, in_columns) = of_lines(block, width, height, &|line, k| k * width + line);
-            Lines { row, column, pairs: [in_rows, in_columns] }
+            })
+        };
+        let rows = of_lines(height, width, &|line, k| line * width + k);
+        let columns = of_lines(width, height, &|line, k| k * width + line);
+        let lines = [0, 1].map(|k| Lines {
+            row: rows[k].0,
+            column: columns[k].0,
+            pairs: [rows[k].1, columns[k].1],
         });
         let nearest = neighbours(&level, width, 1);
         let weighted = beside.times(OUTER_WEIGHT).and(nearest.times(1.0 - OUTER_WEIGHT));
@@ -117,28 +124,50 @@ impl Sum {
     }
 }
 
-/// Sums over pairs of a line's pixels in blocks of `block_px` that do not touch.
-fn along(line: impl Iterator<Item = f64>, block_px: usize) -> Sum {
-    let (mut whole, mut before, mut block) = ([0.0; 2], [0.0; 2], [0.0; 2]);
-    let mut close = [0.0; 2];
-    let mut end = |block: [f64; 2], before: [f64; 2]| {
-        for k in 0..2 {
-            whole[k] += block[k];
-            close[k] += block[k] * (block[k] + 2.0 * before[k]);
-        }
-    };
-    for (k, r) in line.enumerate() {
-        if k > 0 && k % block_px == 0 {
-            end(block, before);
-            (before, block) = (block, [0.0; 2]);
+/// Sums of a line's values and their numbers: of all, of the last two blocks, and of pairs in blocks that touch.
+#[derive(Default)]
+struct Blocks {
+    length: usize,
+    whole: [f64; 2],
+    before: [f64; 2],
+    block: [f64; 2],
+    close: [f64; 2],
+}
+
+impl Blocks {
+    fn add(&mut self, k: usize, r: f64) {
+        if k > 0 && k.is_multiple_of(self.length) {
+            self.end();
         }
         if r.is_finite() {
-            block[0] += r;
-            block[1] += 1.0;
+            self.block[0] += r;
+            self.block[1] += 1.0;
         }
     }
-    end(block, before);
-    Sum { products: whole[0].powi(2) - close[0], pairs: whole[1].powi(2) - close[1] }
+
+    fn end(&mut self) {
+        let (block, before) = (std::mem::take(&mut self.block), self.before);
+        for k in 0..2 {
+            self.whole[k] += block[k];
+            self.close[k] += block[k] * (block[k] + 2.0 * before[k]);
+        }
+        self.before = block;
+    }
+
+    fn apart(mut self) -> Sum {
+        self.end();
+        let [products, pairs] = [0, 1].map(|k| self.whole[k].powi(2) - self.close[k]);
+        Sum { products, pairs }
+    }
+}
+
+/// Sums over pairs of a line's pixels in blocks that do not touch, for either length of them.
+fn along(line: impl Iterator<Item = f64>) -> [Sum; 2] {
+    let mut all = BLOCKS_PX.map(|length| Blocks { length, ..Blocks::default() });
+    for (k, r) in line.enumerate() {
+        all.iter_mut().for_each(|blocks| blocks.add(k, r));
+    }
+    all.map(Blocks::apart)
 }
 
 /// Sums over pairs within `reach` of each other, by box sums.
@@ -185,18 +214,15 @@ impl Plane {
     }
 
     /// Leverage of two pixels of a line on each other, summed over the pairs of [`along`].
-    fn leverage_along(
-        &self,
-        image: &[f32],
-        line: impl Iterator<Item = usize> + Clone,
-        block_px: usize,
-    ) -> f64 {
-        let of = |k: usize| {
+    fn leverage_along(&self, image: &[f32], line: impl Iterator<Item = usize> + Clone) -> [f64; 2] {
+        let mut all = [0.0; 2];
+        for k in 0..3 {
             let whitened = |i: usize| (self.whitening * self.columns(i))[k];
             let seen = |i: usize| if image[i].is_finite() { whitened(i) } else { f64::NAN };
-            along(line.clone().map(seen), block_px).products
-        };
-        (0..3).map(of).sum()
+            let sums = along(line.clone().map(seen));
+            all.iter_mut().zip(sums).for_each(|(all, sum)| *all += sum.products);
+        }
+        all
     }
 }
 
