@@ -23,6 +23,7 @@ use super::noise::texture_finding::TextureFinding;
 use super::options::{Ablation, EACH_LEVEL};
 use super::search::bias;
 use super::search::few_views::few_views;
+use super::search::layer_null::Group;
 use super::search::outcome::Outcome;
 use super::search::variance;
 use super::steps::{COARSE_SIGMAS, own_step, own_step_note, steps};
@@ -118,7 +119,7 @@ impl Case<'_> {
             fold_into_sigma(&mut curves);
         }
         // Shares are still in nats.
-        let clear = scatter.outcome.noise.threshold(self.options.level);
+        let clear = scatter.outcome.noise.threshold(Group::Other, self.options.level);
         let clearly = refitted.as_ref().is_some_and(|f| f.share > clear);
         let better_form = self.tell_form(&mut curves, clearly);
         let read = ranges.into_iter().chain(self.column_steps.clone());

@@ -7,7 +7,7 @@ use crate::rng::Seed;
 #[derive(Debug, Clone, Copy)]
 pub struct DiagnoseOptions {
     pub seed: Seed,
-    /// Probability of any false alarm on a clean recording.
+    /// False-alarm rate on clean recordings that the tests share; their shares add up to 1.35 of it.
     pub level: f64,
     /// Whether the model was calibrated on this very recording, with all causes present: sigma is then
     /// refitted with everything found, and the refit is no finding.
@@ -20,7 +20,7 @@ impl Default for DiagnoseOptions {
     fn default() -> Self {
         DiagnoseOptions {
             seed: Seed(1),
-            level: 0.03,
+            level: 0.02,
             calibrated_here: false,
             ablation: Ablation::None,
         }
@@ -45,7 +45,7 @@ pub const MIN_VIEWS: usize = 3;
 pub const FRAMES_KEPT: usize = 4;
 
 /// Share of the overall false-alarm rate for each of some 20 tests beside the searches.
-pub const EACH_LEVEL: f64 = 0.02;
+pub const EACH_LEVEL: f64 = 0.03;
 /// The 80 % quantile of a standard normal distribution.
 pub const POWER_80: f64 = 0.84;
 

@@ -15,9 +15,11 @@ use crate::diagnose::finding::pixels::terms_of;
 use crate::diagnose::finding::scene::Scene;
 use crate::diagnose::options::POWER_80;
 use crate::diagnose::search::MIN_SHARE_OF_GAIN;
+use crate::diagnose::search::beside::Beside;
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::{Evidence, gain};
-use crate::diagnose::search::null::{Null, beside_chosen};
+use crate::diagnose::search::layer_null::Group;
+use crate::diagnose::search::null::Null;
 use crate::diagnose::search::outcome::Outcome;
 use crate::diagnose::search::prepared::evidence_of_bases;
 use crate::diagnose::search::rules::Rules;
@@ -46,10 +48,10 @@ impl DetectionCriteria<'_> {
         let bases: Vec<&Basis> = self.beside.iter().chain([&unit.basis]).collect();
         let m = self.beside.as_ref().map_or(0, Basis::count);
         let views = evidence_of_bases(&self.left(), &bases);
-        let alone = beside_chosen(&views, m, self.rules.prior)?;
+        let alone = Beside::of(&views, m, self.rules.prior)?.alone(&views);
         let null = Null::of_candidate(&alone, self.rules.prior)?;
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
-        let threshold = self.outcome.noise.threshold(self.rules.level);
+        let threshold = self.outcome.noise.threshold(Group::Named, self.rules.level);
         let need =
             null.gain_for(threshold, alone.len(), &self.rules).max(MIN_SHARE_OF_GAIN * first);
         let u = DVector::from_column_slice(&unit.coefficients);

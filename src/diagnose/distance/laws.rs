@@ -1,13 +1,17 @@
 //! Laws of distance error, fitted to views whose distance was measured by other means.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
 
 use super::referenced_view::{ReferencedView, Scatter, is_tilted};
 use super::warm_up::warm_up;
 use crate::diagnose::checks::replication::Halves;
 use crate::diagnose::joint::anchor::Family;
+use crate::diagnose::search::beside::Beside;
 use crate::diagnose::search::evidence::{Evidence, gain};
+use crate::diagnose::search::noise_gains::REPLICATES;
 use crate::diagnose::search::null::Null;
+use crate::rng::Seed;
 use crate::terms::Axis;
 
 /// A law of distance error.
@@ -27,7 +31,9 @@ pub struct Law {
     pub gain: f64,
     /// Coefficient and its standard error.
     pub estimate: [f64; 2],
-    pub null: Null,
+    pub dispersion: f64,
+    /// Gains of simulated errors of the references, the same for all laws, nats.
+    pub of_noise: Vec<f64>,
     /// Degrees of freedom of the estimate of the references' error.
     pub freedom: f64,
     /// Whether both halves of the references say the same.
@@ -54,10 +60,16 @@ struct References<'a> {
     /// Shift of each view by one unit of each nuisance, m.
     others: Vec<Vec<f64>>,
     scatter: Scatter,
+    /// Simulated errors of each reference, in standard deviations.
+    noise: Vec<DMatrix<f64>>,
 }
 
 impl<'a> References<'a> {
-    fn of(checked: &'a [ReferencedView], Nuisances { bent_m, open }: &Nuisances) -> Self {
+    fn of(
+        checked: &'a [ReferencedView],
+        Nuisances { bent_m, open }: &Nuisances,
+        seed: Seed,
+    ) -> Self {
         let angles = if is_tilted(checked) { 2 } else { 0 };
         let bent = (*bent_m > 0.0).then_some(*bent_m);
         let others = |c: &ReferencedView| -> Vec<f64> {
@@ -65,7 +77,10 @@ impl<'a> References<'a> {
             angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
         };
         let scatter = Scatter::of(checked);
-        References { checked, others: checked.iter().map(others).collect(), scatter }
+        let mut rng = seed.stream("laws/noise");
+        let mut errors = || DMatrix::from_fn(1, REPLICATES, |_, _| StandardNormal.sample(&mut rng));
+        let noise = checked.iter().map(|_| errors()).collect();
+        References { checked, others: checked.iter().map(others).collect(), scatter, noise }
     }
 
     /// Evidence on the nuisances, and on a law that moves the views so far.
@@ -104,6 +119,14 @@ impl<'a> References<'a> {
         };
         let second: Vec<bool> = checked.iter().map(|c| c.in_second_half).collect();
         let halves = Halves::of(&views, &second, PRIOR, &vec![1; beside + 1]);
+        let score = |(n, noise): (usize, &DMatrix<f64>)| {
+            let own = self.others[n].iter().copied().chain([moves[n]]);
+            let column = DVector::from_iterator(beside + 1, own);
+            column / self.scatter.variances[n].sqrt() * noise
+        };
+        let scores = self.noise.iter().enumerate().map(score).collect();
+        let fit = Beside::of(&views, beside, PRIOR)?;
+        let null = Null::of_candidate(&fit.alone(&views), PRIOR)?;
         Some(Law {
             family,
             axis,
@@ -117,7 +140,8 @@ impl<'a> References<'a> {
             settled: Vec::new(),
             gain: gain.total,
             estimate: [beta, gain.covariance[(beside, beside)].sqrt()],
-            null: Null::of(&views, beside, PRIOR)?,
+            dispersion: null.dispersion,
+            of_noise: null.gains(&fit.scores(&views, scores)),
             freedom: self.scatter.freedom.max(1.0),
             replicated: halves.and_then(|h| h.replicate_beside(&[beside])),
         })
@@ -125,11 +149,11 @@ impl<'a> References<'a> {
 }
 
 /// Fits all laws, with their gains on references left out; none where there are too few references.
-pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
+pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances, seed: Seed) -> Vec<Law> {
     if checked.len() < MIN_VIEWS {
         return Vec::new();
     }
-    let mut references = References::of(checked, nuisances);
+    let mut references = References::of(checked, nuisances, seed);
     let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.without_law()));
     if nuisances.open.is_empty() {
         laws.extend(references.law("disparity-offset", Axis::Z, ReferencedView::moved_by_a_px));

@@ -4,7 +4,7 @@ use super::*;
 use crate::diagnose::diagnosis::Alternative;
 use crate::diagnose::missing::shapes::Step;
 use crate::diagnose::search::candidate::Candidate;
-use crate::diagnose::search::noise_gains::NoiseGains;
+use crate::diagnose::search::layer_null::LayerNull;
 use crate::diagnose::search::outcome::Rival;
 use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::surveyed_view::MEAN_PRECISION;
@@ -77,7 +77,7 @@ fn in_doubt() -> Outcome {
         rivals,
         p: 0.001,
     };
-    Outcome { chosen: vec![chosen], noise: NoiseGains::unknown(), ..Outcome::default() }
+    Outcome { chosen: vec![chosen], noise: LayerNull::unknown(), ..Outcome::default() }
 }
 
 fn stated(p: [f64; 2]) -> Vec<Alternative> {

@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, RECALIBRATE};
 use super::judge::Judged;
-use super::noise_gains::NoiseGains;
+use super::layer_null::{Group, LayerNull};
 use super::outcome::{Chosen, Rival};
 use super::rules::Rules;
 use crate::diagnose::finding::naming::{ln_occam, ln_odds};
@@ -34,7 +34,7 @@ pub struct Choice<'a> {
     pub candidates: &'a [Candidate],
     pub judged: &'a [Option<Judged>],
     pub rules: &'a Rules,
-    pub noise: &'a NoiseGains,
+    pub noise: &'a LayerNull,
 }
 
 impl Choice<'_> {
@@ -43,7 +43,6 @@ impl Choice<'_> {
     pub fn best(&self, chosen: &[Chosen]) -> Option<Chosen> {
         let families = self.ranked(true, |i| self.dispersion_corrected_gain(i));
         let curves = self.ranked(false, |i| self.total(i));
-        let threshold = self.noise.threshold(self.rules.level);
         let new = |i: usize| {
             !chosen.iter().any(|c| same_curve(&c.candidate, &self.candidates[i]))
                 && self.is_sensible(i)
@@ -52,8 +51,7 @@ impl Choice<'_> {
             self.rules.agreed.then(|| self.ranked(false, |i| self.dispersion_corrected_gain(i)));
         let curve = || {
             let ranked = agreed.as_ref().unwrap_or(&curves);
-            let mut clear =
-                ranked.iter().copied().filter(|&i| self.calibrated_gain(i) > threshold && new(i));
+            let mut clear = ranked.iter().copied().filter(|&i| self.is_significant(i) && new(i));
             let best = clear.next()?;
             // A curve over one coordinate goes first; the rest of the map is looked for next.
             let is_map = |i: usize| matches!(self.candidates[i].basis, Basis::Map { .. });
@@ -72,7 +70,7 @@ impl Choice<'_> {
             gain: self.total(winner),
             best_curve: self.best_curve(&curves),
             rivals: self.rivals(winner, &families)?,
-            p: self.noise.p(self.calibrated_gain(winner)),
+            p: self.noise.p(self.group(winner), self.calibrated_gain(winner)),
         })
     }
 
@@ -82,6 +80,15 @@ impl Choice<'_> {
 
     fn calibrated_gain(&self, i: usize) -> f64 {
         self.judged[i].as_ref().map_or(0.0, |j| j.calibrated_gain(self.rules))
+    }
+
+    fn group(&self, i: usize) -> Group {
+        Group::of(&self.candidates[i])
+    }
+
+    /// Whether noise alone hardly brings as much.
+    fn is_significant(&self, i: usize) -> bool {
+        self.calibrated_gain(i) > self.noise.threshold(self.group(i), self.rules.level)
     }
 
     /// See [`corrected`].
@@ -121,7 +128,6 @@ impl Choice<'_> {
 
     /// Name to take, if any: of those as good as the best, the one with the fewest columns.
     fn name(&self, families: &[usize], curves: &[usize]) -> Option<usize> {
-        let threshold = self.noise.threshold(self.rules.level);
         let best_curve = self.best_curve(curves);
         let best_family =
             families.first().map_or(f64::NEG_INFINITY, |&i| self.dispersion_corrected_gain(i));
@@ -135,10 +141,9 @@ impl Choice<'_> {
                 self.dispersion_corrected_gain(i) > best_family - slack
                     || self.is_as_exact_as_a_formula(i, most)
             })
+            .filter(|&i| self.is_significant(i))
             .min_by_key(|&i| (columns(i), !self.rests_on_a_measurement(i)))
-            .filter(|&i| {
-                self.calibrated_gain(i) > threshold && self.total(i) > self.adequacy(i) * best_curve
-            })
+            .filter(|&i| self.total(i) > self.adequacy(i) * best_curve)
             .filter(|&i| {
                 let axis = |k: usize| self.candidates[k].basis.axis();
                 let own = curves.iter().copied().find(|&k| axis(k) == axis(i));

@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::evidence::Gain;
-use super::noise_gains::NoiseGains;
+use super::layer_null::{Group, LayerNull};
 use super::null::Null;
 use super::outcome::Look;
 use super::rules::Rules;
@@ -11,6 +11,8 @@ use crate::terms::Basis;
 pub struct Judged {
     pub gain: Gain,
     pub null: Null,
+    /// Gains of simulated noise, nats; empty once the layer's null is known.
+    pub of_noise: Vec<f64>,
     /// Large enough beside the largest term, and larger than what fixed errors of the pixels make by
     /// chance.
     pub sensible: bool,
@@ -28,7 +30,7 @@ pub fn looks(
     candidates: &[Candidate],
     judged: &[Option<Judged>],
     rules: &Rules,
-    noise: &NoiseGains,
+    noise: &LayerNull,
 ) -> Vec<Look> {
     let nameless = candidates.iter().zip(judged).filter(|(c, _)| c.family.is_none());
     nameless
@@ -37,7 +39,7 @@ pub fn looks(
             Some(Look {
                 basis: c.basis.clone(),
                 coefficients: own(&j.gain, &c.basis).to_vec(),
-                p: noise.p(j.calibrated_gain(rules)),
+                p: noise.p(Group::Other, j.calibrated_gain(rules)),
             })
         })
         .collect()

@@ -1,6 +1,7 @@
 //! Greedy forward search for missing terms; each step is judged on held-out views against the null
 //! distribution of the gain.
 
+pub mod beside;
 pub mod bias;
 pub mod candidate;
 pub mod choose;
@@ -8,6 +9,7 @@ mod each_view;
 pub mod evidence;
 pub mod few_views;
 pub mod judge;
+pub mod layer_null;
 pub mod layer_search;
 pub mod noise_gains;
 pub mod null;
@@ -20,6 +22,7 @@ pub mod rules;
 mod trial;
 pub mod variance;
 pub mod view_levels;
+mod view_noise;
 pub mod view_worth;
 
 use std::rc::Rc;
@@ -29,12 +32,12 @@ use rayon::prelude::*;
 use crate::diagnose::views::samples::ViewData;
 use crate::rng::Seed;
 use crate::terms::{Basis, Term};
+use beside::Beside;
 use candidate::Candidate;
 use choose::Choice;
 use evidence::{Evidence, fit, gain};
 use judge::{Judged, looks};
-use noise_gains::NoiseGains;
-use null::{Null, beside_chosen};
+use layer_null::{Group, LayerNull};
 use outcome::{Chosen, Look, Outcome, bases, bases_where};
 use prepared::{Grouping, Patches, Prepared, Together, prepare};
 use rules::Rules;
@@ -116,7 +119,7 @@ struct Layer<'a> {
     candidates: &'a [Candidate],
     nests: Vec<Vec<usize>>,
     rules: &'a Rules,
-    noise: Option<NoiseGains>,
+    noise: Option<LayerNull>,
     looks: Vec<Look>,
     /// Root mean square of the largest term so far.
     largest: f64,
@@ -201,17 +204,21 @@ impl<'a> Layer<'a> {
     /// threshold.
     fn step(&mut self, chosen: &[Chosen]) -> Option<Chosen> {
         let trial = self.trial(chosen)?;
-        let of_nest = |nest: &Vec<usize>| trial.judged(self.candidates, nest);
-        let of_nests: Vec<Vec<(usize, Judged)>> = self.nests.par_iter().map(of_nest).collect();
+        let simulates = self.noise.is_none() && self.rules.calibrated;
+        let noise = simulates.then(|| trial.noise(self.candidates, &self.nests, self.seed));
+        let of_nest = |(n, nest): (usize, &Vec<usize>)| {
+            trial.judged(self.candidates, nest, noise.as_ref().map(|noise| &noise[n]))
+        };
+        let of_nests: Vec<Vec<(usize, Judged)>> =
+            self.nests.par_iter().enumerate().map(of_nest).collect();
         let mut judged: Vec<Option<Judged>> = self.candidates.iter().map(|_| None).collect();
         of_nests.into_iter().flatten().for_each(|(k, j)| judged[k] = Some(j));
         let beside = trial.beside;
         if self.noise.is_none() {
-            let nulls: Vec<&Null> = judged.iter().flatten().map(|j| &j.null).collect();
-            let noise = if self.rules.calibrated {
-                NoiseGains::of(&nulls, self.seed)
+            let noise = if simulates {
+                LayerNull::of(self.candidates, &judged)
             } else {
-                NoiseGains::unknown()
+                LayerNull::unknown()
             };
             self.looks = looks(self.candidates, &judged, self.rules, &noise);
             self.noise = Some(noise);
@@ -228,8 +235,13 @@ impl<'a> Layer<'a> {
         let pinned: Vec<&Basis> = self.pinned.iter().map(|c| &c.candidate.basis).collect();
         let columns = pinned.iter().map(|b| b.count()).sum();
         let evidence = self.together.evidence(&[&pinned[..], terms].concat());
-        let alone = beside_chosen(&evidence, columns, self.rules.prior);
-        alone.and_then(|alone| gain(&alone, self.rules.prior)).map_or(0.0, |g| g.total)
+        let beside = Beside::of(&evidence, columns, self.rules.prior);
+        let gain = beside.and_then(|b| gain(&b.alone(&evidence), self.rules.prior));
+        gain.map_or(0.0, |g| g.total)
+    }
+
+    fn threshold(&self, noise: &LayerNull, candidate: &Candidate) -> f64 {
+        noise.threshold(Group::of(candidate), self.rules.level)
     }
 
     /// Drops terms that bring no more than noise given the others, such as one chosen before the real
@@ -253,7 +265,9 @@ impl<'a> Layer<'a> {
             let concerned = (0..chosen.len()).filter(|&k| !completed(k));
             let idlest = concerned.map(lost).min_by(|a, b| a.1.total_cmp(&b.1));
             match idlest {
-                Some((k, lost)) if lost < noise.threshold(self.rules.level) => chosen.remove(k),
+                Some((k, lost)) if lost < self.threshold(noise, &chosen[k].candidate) => {
+                    chosen.remove(k)
+                }
                 _ => return,
             };
         }
@@ -274,7 +288,8 @@ impl<'a> Layer<'a> {
             let before = *so_far.get_or_insert_with(|| self.total(&old));
             let after = self.total(&new);
             let better = after - before;
-            if self.noise.as_ref().is_some_and(|n| better > n.threshold(self.rules.level)) {
+            let is_clear = |noise| better > self.threshold(noise, &chosen[k].candidate);
+            if self.noise.as_ref().is_some_and(is_clear) {
                 chosen[k].gain += better;
                 chosen[k].candidate.basis = finer;
                 so_far = Some(after);

@@ -2,9 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::null::Null;
-use crate::rng::Seed;
-
 /// Largest gains of all candidates under noise alone, nats.
 #[derive(Debug, Clone, Default)]
 pub struct NoiseGains {
@@ -14,16 +11,17 @@ pub struct NoiseGains {
 }
 
 /// Simulations of the null.
-const REPLICATES: u64 = 600;
+pub const REPLICATES: usize = 600;
 pub const MIN_EXCESS: f64 = 0.5;
 /// Upper-tail probability beyond which a log-likelihood is taken to fall off exponentially.
 const TAIL: f64 = 0.1;
 
 impl NoiseGains {
-    pub fn of(nulls: &[&Null], seed: Seed) -> Self {
-        NoiseGains::simulated(REPLICATES, MIN_EXCESS, |replicate| {
-            let mut rng = seed.stream(&format!("diagnose/null/{replicate}"));
-            nulls.iter().map(|null| null.draw(&mut rng)).fold(0.0, f64::max)
+    /// Of the gains that all candidates have of the same draws of noise.
+    pub fn of<'a>(candidates: impl Iterator<Item = &'a [f64]>) -> Self {
+        let all: Vec<&[f64]> = candidates.collect();
+        NoiseGains::simulated(REPLICATES as u64, MIN_EXCESS, |draw| {
+            all.iter().map(|gains| gains[draw as usize]).fold(0.0, f64::max)
         })
     }
 

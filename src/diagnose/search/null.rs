@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
+use super::beside::Beside;
 use super::evidence::Evidence;
 use super::rules::Rules;
 use crate::rng::Stream;
@@ -12,6 +13,8 @@ use crate::rng::Stream;
 /// Computed in the eigenvectors of the summed A, where each view's A is taken as diagonal: exact if the
 /// views' A are multiples of one another, and a thousand times faster.
 pub struct Null {
+    /// Eigenvectors of the summed A.
+    axes: DMatrix<f64>,
     /// For each eigenvector, the information of each view and the total.
     vectors: Vec<(Vec<Information>, f64)>,
     prior: f64,
@@ -31,10 +34,10 @@ struct Information {
 impl Null {
     /// Null of the columns from `chosen` on, given the columns before them.
     pub fn of(views: &[Evidence], chosen: usize, prior: f64) -> Option<Self> {
-        Null::of_candidate(&beside_chosen(views, chosen, prior)?, prior)
+        Null::of_candidate(&Beside::of(views, chosen, prior)?.alone(views), prior)
     }
 
-    /// Null of evidence that [`beside_chosen`] has reduced.
+    /// Null of evidence that [`Beside::alone`] has reduced.
     pub fn of_candidate(alone: &[Evidence], prior: f64) -> Option<Self> {
         let k = alone.first()?.b.len();
         let u = Evidence::sum(k, 0.0, alone).a.symmetric_eigen().eigenvectors;
@@ -51,7 +54,7 @@ impl Null {
             (values.map(|value| Information { value, root: value.sqrt() }).collect(), total)
         };
         let vectors = total.iter().enumerate().map(of_vector).collect();
-        Some(Null { vectors, prior, dispersion, about_fit })
+        Some(Null { axes: u, vectors, prior, dispersion, about_fit })
     }
 
     /// Calibrates a gain over so many views by `rules`, for comparison with the null distribution,
@@ -86,21 +89,39 @@ impl Null {
 
     /// Draws the gain of one recording of pure noise, nats.
     pub fn draw(&self, rng: &mut Stream) -> f64 {
-        let mut gain = 0.0;
+        let mut normal = || -> f64 { StandardNormal.sample(rng) };
         let mut b = Vec::new();
+        let mut gain = 0.0;
         for (views, total) in &self.vectors {
             b.clear();
-            b.extend(views.iter().map(|a| {
-                let draw: f64 = StandardNormal.sample(rng);
-                a.root * draw
-            }));
-            let sum: f64 = b.iter().sum();
-            for (b, a) in b.iter().zip(views) {
-                let beta = (sum - b) / (total - a.value + self.prior);
-                gain += beta * (b - 0.5 * beta * a.value);
-            }
+            b.extend(views.iter().map(|a| a.root * normal()));
+            gain += self.gain_along(views, *total, &b);
         }
         gain
+    }
+
+    /// Gains of recordings with these scores, nats: one matrix a view, one column a recording.
+    pub fn gains(&self, scores: &[DMatrix<f64>]) -> Vec<f64> {
+        let turned: Vec<DMatrix<f64>> = scores.iter().map(|b| self.axes.tr_mul(b)).collect();
+        let recordings = turned.first().map_or(0, DMatrix::ncols);
+        let of = |r: usize| {
+            let along = |(j, (views, total)): (usize, &(Vec<Information>, f64))| {
+                let b: Vec<f64> = turned.iter().map(|b| b[(j, r)]).collect();
+                self.gain_along(views, *total, &b)
+            };
+            self.vectors.iter().enumerate().map(along).sum()
+        };
+        (0..recordings).map(of).collect()
+    }
+
+    /// Gain along one eigenvector, each view predicted from the others' scores `b`.
+    fn gain_along(&self, views: &[Information], total: f64, b: &[f64]) -> f64 {
+        let sum: f64 = b.iter().sum();
+        let of = |(b, a): (&f64, &Information)| {
+            let beta = (sum - b) / (total - a.value + self.prior);
+            beta * (b - 0.5 * beta * a.value)
+        };
+        b.iter().zip(views).map(of).sum()
     }
 }
 
@@ -118,37 +139,6 @@ pub fn student(nats: f64, freedom: f64) -> f64 {
 /// Inverse of [`student`].
 fn gaussian(nats: f64, freedom: f64) -> f64 {
     0.5 * freedom * (2.0 * nats / freedom).exp_m1()
-}
-
-/// Evidence of each view on a candidate, with the chosen terms (the columns before its own) fitted
-/// jointly to all views.
-pub fn beside_chosen(views: &[Evidence], chosen: usize, prior: f64) -> Option<Vec<Evidence>> {
-    let n = views.first()?.b.len();
-    let k = n - chosen;
-    if chosen == 0 {
-        return Some(views.to_vec());
-    }
-    let mut mm = DMatrix::identity(chosen, chosen) * prior;
-    let mut mk = DMatrix::zeros(chosen, k);
-    let mut bm = DVector::zeros(chosen);
-    for v in views {
-        mm += v.a.view((0, 0), (chosen, chosen));
-        mk += v.a.view((0, chosen), (chosen, k));
-        bm += v.b.rows(0, chosen);
-    }
-    let factor = mm.cholesky()?;
-    let (t, beta) = (factor.solve(&mk), factor.solve(&bm));
-    let alone = views.iter().map(|v| {
-        let vmm = v.a.view((0, 0), (chosen, chosen));
-        let vmk = v.a.view((0, chosen), (chosen, k));
-        let vkk = v.a.view((chosen, chosen), (k, k));
-        let tm = t.transpose() * vmk;
-        let a = vkk - &tm - tm.transpose() + t.transpose() * vmm * &t;
-        let left_m = v.b.rows(0, chosen) - vmm * &beta;
-        let left_k = v.b.rows(chosen, k) - vmk.transpose() * &beta;
-        Evidence { a, b: left_k - t.transpose() * left_m }
-    });
-    Some(alone.collect())
 }
 
 /// Dispersion of the views' scores about the common fit, relative to noise.

@@ -10,7 +10,13 @@ use crate::rng::{Seed, Stream};
 /// views.
 #[test]
 fn the_gain_for_so_many_nats_counts_for_as_many() {
-    let null = Null { vectors: Vec::new(), prior: 1.0, dispersion: 1.5, about_fit: 3.0 };
+    let null = Null {
+        axes: DMatrix::zeros(0, 0),
+        vectors: Vec::new(),
+        prior: 1.0,
+        dispersion: 1.5,
+        about_fit: 3.0,
+    };
     let rules = |learnt_from| Rules {
         level: 0.01,
         prior: 1.0,

@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain};
-use super::noise_gains::NoiseGains;
+use super::layer_null::LayerNull;
 use crate::diagnose::checks::replication::Halves;
 use crate::model::Covariance;
 use crate::terms::Basis;
@@ -53,7 +53,7 @@ pub struct Outcome {
     /// Fit of all terms at once.
     pub fit: Option<Gain>,
     pub evidence: Vec<Evidence>,
-    pub noise: NoiseGains,
+    pub noise: LayerNull,
     /// All terms fitted to each half of the views.
     pub halves: Option<Halves>,
     /// Covariance of all coefficients.

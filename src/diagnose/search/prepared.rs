@@ -57,7 +57,9 @@ pub struct Prepared<'a> {
     fine: Option<(&'a [PixelContext], Rows<'a>)>,
     pub coarse: (&'a [PixelContext], Rows<'a>),
     /// The fine samples grouped by one coordinate.
-    groups: Vec<(&'a Grouping, Rows<'a>)>,
+    pub(super) groups: Vec<(&'a Grouping, Rows<'a>)>,
+    /// Whether the coarse samples are the fine ones.
+    pub(super) is_one_size: bool,
 }
 
 /// Side of a block of samples, in patches; few nodes of a curve or map lie within one.
@@ -126,6 +128,7 @@ pub fn prepare<'a>(
     let groups = groups.iter().map(grouped).collect();
     Some(Prepared {
         groups,
+        is_one_size: coarse.gathered.is_empty(),
         fine: keep_fine.then_some((&fine.places[..], rows_fine)),
         coarse: (&coarse.places, rows(coarse, &left_coarse, beside)?),
     })
@@ -139,9 +142,9 @@ const EDGE_GROUP_PX: f64 = 0.5;
 pub struct Grouping {
     over: Coordinate,
     /// Mean place of each group's samples.
-    places: Vec<PixelContext>,
+    pub(super) places: Vec<PixelContext>,
     /// The group of each sample.
-    of: Vec<u32>,
+    pub(super) of: Vec<u32>,
 }
 
 impl Grouping {
@@ -186,7 +189,7 @@ pub enum Patches {
 
 impl Prepared<'_> {
     /// Samples that a basis is tried on, and their kind.
-    fn samples(&self, basis: &Basis) -> (&[PixelContext], &Rows<'_>, Patches) {
+    pub(super) fn samples(&self, basis: &Basis) -> (&[PixelContext], &Rows<'_>, Patches) {
         let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
         if let Some((group, rows)) = alone {
             (&group.places, rows, Patches::Fine)

@@ -10,17 +10,19 @@ use super::evidence::Evidence;
 /// already chosen.
 pub struct Rows<'a> {
     /// Inverse variance, in independent samples.
-    weight: Cow<'a, [f64]>,
+    pub(super) weight: Cow<'a, [f64]>,
     /// One row per sample: nuisances, then the chosen terms' columns, then the response.
     samples: Vec<f64>,
-    nuisances: usize,
+    pub(super) nuisances: usize,
+    /// Prior precision of each nuisance about zero; 0 for a free one.
+    pub(super) precision: Vec<f64>,
     /// Number of nuisance and chosen-term columns.
-    width: usize,
+    pub(super) width: usize,
     /// Normal equations of these columns, before the nuisances are profiled out.
-    own: DMatrix<f64>,
+    pub(super) own: DMatrix<f64>,
     seen: DVector<f64>,
     /// Inverse of the nuisances' own block.
-    inverse: DMatrix<f64>,
+    pub(super) inverse: DMatrix<f64>,
 }
 
 impl<'a> Rows<'a> {
@@ -46,8 +48,8 @@ impl<'a> Rows<'a> {
             own[(q, q)] += precision;
         }
         let inverse = own.view((0, 0), (p, p)).into_owned().try_inverse()?;
-        let weight = Cow::Borrowed(weight);
-        Some(Rows { weight, samples, nuisances: p, width, own, seen, inverse })
+        let (weight, precision) = (Cow::Borrowed(weight), precision.to_vec());
+        Some(Rows { weight, samples, nuisances: p, precision, width, own, seen, inverse })
     }
 
     /// Merges samples that share a key; exact for columns that depend on the key alone.
@@ -65,8 +67,9 @@ impl<'a> Rows<'a> {
             row.iter_mut().for_each(|x| *x /= w);
         }
         let (own, seen, inverse) = (self.own.clone(), self.seen.clone(), self.inverse.clone());
-        let weight = Cow::Owned(weight);
-        Rows { weight, samples, nuisances: self.nuisances, width: self.width, own, seen, inverse }
+        let (weight, precision) = (Cow::Owned(weight), self.precision.clone());
+        let (nuisances, width) = (self.nuisances, self.width);
+        Rows { weight, samples, nuisances, precision, width, own, seen, inverse }
     }
 
     /// Weighted sum of squares that the nuisances explain.
@@ -77,13 +80,13 @@ impl<'a> Rows<'a> {
     }
 
     /// Row of sample `i`: nuisances, chosen terms and response.
-    fn sample(&self, i: usize) -> &[f64] {
+    pub(super) fn sample(&self, i: usize) -> &[f64] {
         let n = self.width + 1;
         &self.samples[i * n..][..n]
     }
 
     /// Indices of the samples with positive weight.
-    fn used(&self) -> impl Iterator<Item = usize> {
+    pub(super) fn used(&self) -> impl Iterator<Item = usize> {
         (0..self.weight.len()).filter(|&i| self.weight[i] > 0.0)
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::noise_gains::NoiseGains;
 use super::*;
 use crate::diagnose::views::samples::{COARSE_PX, coarser};
 use crate::rng::{Seed, Stream};
@@ -128,7 +129,7 @@ fn a_curve_that_brings_nothing_beside_the_others_is_left_out() {
         let mut layer = Layer::of(&views, &views, &both, &RULES, Seed(11));
         // Exponential, like the gains of noise.
         let gain = |k: u64| -(1.0 - (k + 1) as f64 / 601.0).ln();
-        layer.noise = Some(NoiseGains::simulated(600, 0.5, gain));
+        layer.noise = Some(LayerNull::same(&NoiseGains::simulated(600, 0.5, gain)));
         let mut chosen: Vec<Chosen> = both.iter().map(|c| layer.pin(c.clone())).collect();
         layer.drop_needless(&mut chosen);
         let left: Vec<Axis> = chosen.iter().map(|c| c.candidate.basis.axis()).collect();

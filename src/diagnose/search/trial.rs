@@ -1,14 +1,18 @@
 //! Trials of candidates alongside the chosen terms.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
+use super::beside::Beside;
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Gain, gain};
 use super::judge::{Judged, own};
-use super::null::{Null, beside_chosen};
+use super::noise_gains::REPLICATES;
+use super::null::Null;
 use super::outcome::Chosen;
 use super::prepared::{Patches, Prepared};
 use super::rules::Rules;
+use crate::rng::Seed;
 use crate::terms::Basis;
 
 /// Prepared views and chosen terms that candidates are tried with.
@@ -29,14 +33,60 @@ pub struct Trial<'a> {
     pub largest: f64,
 }
 
+/// Noise as a nest's widest candidate sees it.
+pub struct NestNoise {
+    /// Scores of each view, one column a draw; `None` where its samples' noise cannot be drawn.
+    scores: Option<Vec<DMatrix<f64>>>,
+    seed: Seed,
+}
+
+impl NestNoise {
+    /// Gains of the candidate whose `null` and `evidence` these are.
+    fn gains(&self, null: &Null, beside: &Beside, evidence: &[Evidence]) -> Vec<f64> {
+        let columns = evidence.first().map_or(0, |e| e.b.len());
+        let Some(scores) = &self.scores else {
+            let mut rng = self.seed.stream(&format!("diagnose/null/{columns}"));
+            return (0..REPLICATES).map(|_| null.draw(&mut rng)).collect();
+        };
+        let own = scores.iter().map(|all| all.rows(0, columns).into_owned()).collect();
+        null.gains(&beside.scores(evidence, own))
+    }
+}
+
 impl Trial<'_> {
     fn patches(&self, c: &Candidate) -> Option<Patches> {
         Some(self.views.first()?.patches(&c.basis))
     }
 
-    /// Judges the candidates of a nest, given by index. Families already chosen are left out: what
-    /// their shape misses is left to the curves.
-    pub fn judged(&self, candidates: &[Candidate], nest: &[usize]) -> Vec<(usize, Judged)> {
+    /// Draws the noise of all views, and scores each nest's widest candidate on it.
+    pub fn noise(
+        &self,
+        candidates: &[Candidate],
+        nests: &[Vec<usize>],
+        seed: Seed,
+    ) -> Vec<NestNoise> {
+        let of_view = |(v, view): (usize, &Prepared<'_>)| {
+            let noise = view.noise(REPLICATES, &mut seed.stream(&format!("diagnose/noise/{v}")));
+            let scores = |nest: &Vec<usize>| view.noise_scores(&candidates[nest[0]].basis, &noise);
+            nests.iter().map(scores).collect::<Vec<_>>()
+        };
+        let mut views: Vec<Vec<Option<DMatrix<f64>>>> =
+            self.views.par_iter().enumerate().map(of_view).collect();
+        let of_nest = |n: usize| NestNoise {
+            scores: views.iter_mut().map(|v| v[n].take()).collect(),
+            seed: Seed(seed.0.wrapping_add(n as u64)),
+        };
+        (0..nests.len()).map(of_nest).collect()
+    }
+
+    /// Judges the candidates of a nest, given by index, with their gains of the `noise` if given. Families
+    /// already chosen are left out: what their shape misses is left to the curves.
+    pub fn judged(
+        &self,
+        candidates: &[Candidate],
+        nest: &[usize],
+        noise: Option<&NestNoise>,
+    ) -> Vec<(usize, Judged)> {
         let taken = |c: &Candidate| {
             let same = |old: &Chosen| c.family.is_some() && old.candidate.family == c.family;
             self.beside.iter().any(same)
@@ -48,14 +98,20 @@ impl Trial<'_> {
         let judged = |k: usize| {
             let c = &candidates[k];
             evidence.iter_mut().for_each(|e| e.truncate(self.settled + c.basis.count()));
-            Some((k, self.judged_by(c, &evidence)?))
+            Some((k, self.judged_by(c, &evidence, noise)?))
         };
         open().filter_map(judged).collect()
     }
 
-    fn judged_by(&self, c: &Candidate, evidence: &[Evidence]) -> Option<Judged> {
+    fn judged_by(
+        &self,
+        c: &Candidate,
+        evidence: &[Evidence],
+        noise: Option<&NestNoise>,
+    ) -> Option<Judged> {
         let (m, prior) = (self.settled, self.rules.prior);
-        let alone = beside_chosen(evidence, m, prior)?;
+        let beside = Beside::of(evidence, m, prior)?;
+        let alone = beside.alone(evidence);
         let null = Null::of_candidate(&alone, prior)?;
         let gain = match &self.base {
             None => gain(&alone, prior)?,
@@ -69,7 +125,8 @@ impl Trial<'_> {
         }
         let rms = self.rms(own(&gain, &c.basis), evidence);
         let sensible = rms >= self.rules.min_rms(&c.basis, self.largest);
-        Some(Judged { gain, null, sensible, rms })
+        let of_noise = noise.map_or_else(Vec::new, |noise| noise.gains(&null, &beside, evidence));
+        Some(Judged { gain, null, of_noise, sensible, rms })
     }
 
     /// Root mean square of a candidate's fit over the samples, with the nuisances profiled out.
@@ -105,7 +162,6 @@ mod tests {
     use super::*;
     use crate::diagnose::search::Layer;
     use crate::diagnose::search::tests::{RULES, session};
-    use crate::rng::Seed;
     use crate::terms::{Coordinate, Modulation, PixelContext};
 
     /// Candidates of fewer orders come before and between wider ones; another period or modulation
@@ -180,10 +236,10 @@ mod tests {
         let trial = layer.trial(&[layer.pin(locking)]).expect("views");
         assert!(trial.settled == 4 && layer.nests == [vec![1, 2, 0], vec![4, 3]]);
         for nest in &layer.nests {
-            let together = trial.judged(&candidates, nest);
+            let together = trial.judged(&candidates, nest, None);
             assert_eq!(together.len(), nest.len());
             for (k, judged) in together {
-                let (_, alone) = trial.judged(&candidates, &[k]).remove(0);
+                let (_, alone) = trial.judged(&candidates, &[k], None).remove(0);
                 approx::assert_relative_eq!(judged.gain.total, alone.gain.total, epsilon = 1e-9);
                 approx::assert_relative_eq!(judged.gain.beta, alone.gain.beta, epsilon = 1e-9);
                 approx::assert_relative_eq!(judged.rms, alone.rms, epsilon = 1e-9);

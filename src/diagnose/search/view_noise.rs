@@ -1,0 +1,117 @@
+//! Noise of a view's samples, drawn many times, and what the candidates' columns make of it.
+//!
+//! Candidates share samples, so noise that looks like one of them also looks like others: the largest of
+//! their gains is smaller than that of as many independent ones.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::evidence::root;
+use super::prepared::{Grouping, Patches, Prepared};
+use super::rows::Rows;
+use crate::rng::Stream;
+use crate::terms::Basis;
+
+/// Noise of one view; one column per draw.
+pub struct ViewNoise {
+    /// At each coarse sample; see [`Rows::noise`].
+    samples: DMatrix<f64>,
+    /// Summed over each grouping.
+    groups: Vec<DMatrix<f64>>,
+    /// Scores of the terms fitted alongside every candidate.
+    beside: DMatrix<f64>,
+}
+
+impl Rows<'_> {
+    /// Draws the noise so many times, weighted and with the nuisances profiled out: one row per sample. Its
+    /// products with columns are scores of their information's covariance.
+    fn noise(&self, draws: usize, rng: &mut Stream) -> DMatrix<f64> {
+        let (n, p) = (self.weight.len(), self.nuisances);
+        let nuisances = DMatrix::from_fn(n, p, |i, q| self.sample(i)[q]);
+        let weighted = DMatrix::from_fn(n, p, |i, q| self.weight[i] * nuisances[(i, q)]);
+        let precision = DVector::from_column_slice(&self.precision);
+        let information = self.own.view((0, 0), (p, p)) - DMatrix::from_diagonal(&precision);
+        // What merged samples no longer tell of the nuisances' scores.
+        let within = root(&(information - weighted.tr_mul(&nuisances)));
+        let mut normal = || -> f64 { StandardNormal.sample(rng) };
+        let roots: Vec<f64> = self.weight.iter().map(|w| w.max(0.0).sqrt()).collect();
+        let mut noise = DMatrix::from_fn(n, draws, |i, _| roots[i] * normal());
+        // A nuisance with a prior scatters by it; a free one is profiled out, whatever it is.
+        let own = DMatrix::from_fn(p, draws, |q, _| match self.precision[q] {
+            precision if precision > 0.0 => normal() / precision.sqrt(),
+            _ => 0.0,
+        });
+        noise.gemm(1.0, &weighted, &own, 1.0);
+        let within = within * DMatrix::from_fn(p, draws, |_, _| normal());
+        let explained = &self.inverse * (nuisances.tr_mul(&noise) + within);
+        noise.gemm(-1.0, &weighted, &explained, 1.0);
+        noise
+    }
+
+    /// Scores of such noise on the chosen terms.
+    fn chosen_scores(&self, noise: &DMatrix<f64>) -> DMatrix<f64> {
+        let (p, m) = (self.nuisances, self.width - self.nuisances);
+        DMatrix::from_fn(m, self.weight.len(), |j, i| self.sample(i)[p + j]) * noise
+    }
+
+    /// Scores of such noise on a candidate; `columns` fills one row of its columns.
+    fn scores(
+        &self,
+        count: usize,
+        mut columns: impl FnMut(usize, &mut [f64]),
+        noise: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut all = DMatrix::zeros(count, self.weight.len());
+        for i in self.used() {
+            columns(i, all.column_mut(i).as_mut_slice());
+        }
+        all * noise
+    }
+}
+
+impl Grouping {
+    /// Sums the samples' rows over each group.
+    fn summed(&self, samples: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut sums = DMatrix::zeros(self.places.len(), samples.ncols());
+        for (mut sum, column) in sums.column_iter_mut().zip(samples.column_iter()) {
+            column.iter().zip(&self.of).for_each(|(x, &k)| sum[k as usize] += x);
+        }
+        sums
+    }
+}
+
+impl Prepared<'_> {
+    /// Draws the noise of the coarse samples, and of each grouping: that of the same samples where these are
+    /// the fine ones, and of its own otherwise.
+    pub fn noise(&self, draws: usize, rng: &mut Stream) -> ViewNoise {
+        let samples = self.coarse.1.noise(draws, rng);
+        let mut of_group = |(group, rows): &(&Grouping, Rows<'_>)| {
+            if self.is_one_size { group.summed(&samples) } else { rows.noise(draws, rng) }
+        };
+        ViewNoise {
+            groups: self.groups.iter().map(&mut of_group).collect(),
+            beside: self.coarse.1.chosen_scores(&samples),
+            samples,
+        }
+    }
+
+    /// Scores of the noise on the terms fitted alongside and the basis, one row per column of these. `None`
+    /// for a basis that is tried on finer samples than the noise was drawn for.
+    pub fn noise_scores(&self, basis: &Basis, noise: &ViewNoise) -> Option<DMatrix<f64>> {
+        let (places, rows, patches) = self.samples(basis);
+        let group = self.groups.iter().position(|(_, of)| std::ptr::eq(of, rows));
+        // The scores of the terms alongside are those of the coarse samples' noise.
+        let is_joint = self.is_one_size || noise.beside.is_empty();
+        let drawn = match (patches, group) {
+            (Patches::Coarse, _) => &noise.samples,
+            (Patches::Fine, Some(g)) => Some(&noise.groups[g]).filter(|_| is_joint)?,
+            (Patches::Fine, None) => Some(&noise.samples).filter(|_| self.is_one_size)?,
+        };
+        let own = rows.scores(basis.count(), |i, g| basis.fill(&places[i], g), drawn);
+        let m = noise.beside.nrows();
+        let mut all = DMatrix::zeros(m + own.nrows(), own.ncols());
+        all.rows_mut(0, m).copy_from(&noise.beside);
+        all.rows_mut(m, own.nrows()).copy_from(&own);
+        Some(all)
+    }
+}
