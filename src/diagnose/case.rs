@@ -170,8 +170,8 @@ impl<'a> Case<'a> {
         &self.recording.sensor
     }
 
-    /// Shares of the overall false-alarm rate: 0.4 for the mean, a quarter for the variance, a tenth for
-    /// the laws, and `EACH_LEVEL` for each of some 20 others. If independent, all add up to 1.35 of the rate.
+    /// Shares of the nominal false-alarm rate: 0.4 for the mean, a quarter for the variance, a tenth for
+    /// the laws, and `EACH_LEVEL` for each of some 20 others.
     pub const MEAN_LEVEL: f64 = 0.4;
     pub const VARIANCE_LEVEL: f64 = 0.25;
     pub const LAWS_LEVEL: f64 = 0.1;

@@ -7,7 +7,8 @@ use crate::rng::Seed;
 #[derive(Debug, Clone, Copy)]
 pub struct DiagnoseOptions {
     pub seed: Seed,
-    /// False-alarm rate on clean recordings that the tests share; their shares add up to 1.35 of it.
+    /// Nominal false-alarm rate, divided among the tests. The shares add up to 1.35: about 2.7 % of clean
+    /// recordings if all tests were independent.
     pub level: f64,
     /// Whether the model was calibrated on this very recording, with all causes present: sigma is then
     /// refitted with everything found, and the refit is no finding.

@@ -37,6 +37,18 @@ const CUT: f64 = 3.5;
 const PAIRS: usize = 10_000;
 
 impl Correlation {
+    /// [`Correlation::sum_of_squares`] over the pairs within a square of this side, px.
+    pub fn sum_of_squares_within(&self, side: f64) -> f64 {
+        let part = |rho: &[f64]| {
+            let sum = |of: &dyn Fn(f64) -> f64| {
+                let lags = rho.iter().enumerate().skip(1);
+                1.0 + 2.0 * lags.map(|(lag, rho)| rho * rho * of(lag as f64)).sum::<f64>()
+            };
+            sum(&|lag| (1.0 - lag / side).max(0.0)) / sum(&|_| 1.0)
+        };
+        self.sum_of_squares * part(&self.along_u) * part(&self.along_v)
+    }
+
     /// Correlation of white noise.
     pub fn white() -> Self {
         let alone = || vec![1.0];

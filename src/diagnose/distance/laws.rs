@@ -84,12 +84,11 @@ impl<'a> References<'a> {
     }
 
     /// Evidence on the nuisances, and on a law that moves the views so far.
-    fn evidence(&self, law: Option<&dyn Fn(&ReferencedView) -> f64>) -> Vec<Evidence> {
+    fn evidence(&self, law: &dyn Fn(&ReferencedView) -> f64) -> Vec<Evidence> {
         let of = |(n, c): (usize, &ReferencedView)| {
-            let law = law.map(|moves| moves(c));
             let g = DVector::from_iterator(
-                self.others[n].len() + usize::from(law.is_some()),
-                self.others[n].iter().copied().chain(law),
+                self.others[n].len() + 1,
+                self.others[n].iter().copied().chain([law(c)]),
             );
             let variance = self.scatter.variances[n];
             Evidence { a: &g * g.transpose() / variance, b: g * (c.off / variance) }
@@ -106,13 +105,10 @@ impl<'a> References<'a> {
     ) -> Option<Law> {
         let checked = self.checked;
         let beside = self.others.first().map_or(0, Vec::len);
-        let views = self.evidence(Some(&moves));
+        let views = self.evidence(&moves);
         let moves: Vec<f64> = checked.iter().map(moves).collect();
-        let mut gain = gain(&views, PRIOR)?;
-        if beside > 0 {
-            gain.total -= self::gain(&self.evidence(None), PRIOR).map_or(0.0, |alone| alone.total);
-        }
-        let beta = gain.beta[beside];
+        let together = gain(&views, PRIOR)?;
+        let beta = together.beta[beside];
         let rms = |of: &dyn Fn(usize) -> f64| {
             let squares: f64 = (0..checked.len()).map(|n| of(n).powi(2)).sum();
             (squares / checked.len() as f64).sqrt()
@@ -126,7 +122,8 @@ impl<'a> References<'a> {
         };
         let scores = self.noise.iter().enumerate().map(score).collect();
         let fit = Beside::of(&views, beside, PRIOR)?;
-        let null = Null::of_candidate(&fit.alone(&views), PRIOR)?;
+        let alone = fit.alone(&views);
+        let null = Null::of_candidate(&alone, PRIOR)?;
         Some(Law {
             family,
             axis,
@@ -138,8 +135,8 @@ impl<'a> References<'a> {
             rms_sigma: rms(&|n| beta * moves[n] / checked[n].sigma_m),
             rms_errors: rms(&|n| beta * moves[n] / self.scatter.variances[n].sqrt()),
             settled: Vec::new(),
-            gain: gain.total,
-            estimate: [beta, gain.covariance[(beside, beside)].sqrt()],
+            gain: gain(&alone, PRIOR)?.total,
+            estimate: [beta, together.covariance[(beside, beside)].sqrt()],
             dispersion: null.dispersion,
             of_noise: null.gains(&fit.scores(&views, scores)),
             freedom: self.scatter.freedom.max(1.0),
@@ -167,7 +164,7 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances, seed: Seed) -> Ve
     let wider = *freedom / (*freedom - 2.0).max(1.0);
     variances.iter_mut().for_each(|v| *v *= wider);
     let session_s = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
-    if let Some(warm_up) = warm_up(session_s, |moves| references.evidence(Some(moves))) {
+    if let Some(warm_up) = warm_up(session_s, |moves| references.evidence(moves)) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
             law.estimate = warm_up.relative;
             law.settled = vec![("time_constant_s", warm_up.time_constant_s)];

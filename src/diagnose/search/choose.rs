@@ -126,7 +126,8 @@ impl Choice<'_> {
         curves.first().map_or(f64::NEG_INFINITY, |&i| self.total(i))
     }
 
-    /// Name to take, if any: of those as good as the best, the one with the fewest columns.
+    /// Name to take, if any: of those as good as the best, the family with the fewest columns, by its simplest
+    /// significant shape.
     fn name(&self, families: &[usize], curves: &[usize]) -> Option<usize> {
         let best_curve = self.best_curve(curves);
         let best_family =
@@ -134,15 +135,19 @@ impl Choice<'_> {
         let most = families.iter().map(|&i| self.total(i)).fold(0.0, f64::max);
         let slack = as_good(best_family);
         let columns = |i: usize| self.candidates[i].basis.count();
-        families
-            .iter()
-            .copied()
-            .filter(|&i| {
+        let simplest = |all: &mut dyn Iterator<Item = usize>| {
+            all.min_by_key(|&i| (columns(i), !self.rests_on_a_measurement(i)))
+        };
+        let as_good = || {
+            families.iter().copied().filter(|&i| {
                 self.dispersion_corrected_gain(i) > best_family - slack
                     || self.is_as_exact_as_a_formula(i, most)
             })
-            .filter(|&i| self.is_significant(i))
-            .min_by_key(|&i| (columns(i), !self.rests_on_a_measurement(i)))
+        };
+        let family = self.candidates[simplest(&mut as_good())?].family;
+        // A family's simplest shape may be too weak where a wider one of it is not.
+        let own = |&i: &usize| self.candidates[i].family == family && self.is_significant(i);
+        simplest(&mut as_good().filter(own))
             .filter(|&i| self.total(i) > self.adequacy(i) * best_curve)
             .filter(|&i| {
                 let axis = |k: usize| self.candidates[k].basis.axis();

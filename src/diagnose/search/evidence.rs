@@ -2,7 +2,7 @@
 //!
 //! A view's evidence is quadratic in the coefficients: with its nuisances (the plane, or the
 //! view's own level) profiled out, log p(view | beta) = beta' b - beta' A beta / 2 + const. The
-//! search then needs only A and b of every view, and so does the simulation of its null.
+//! search then needs only A and b of every view.
 
 use std::borrow::Borrow;
 

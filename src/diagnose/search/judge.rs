@@ -11,7 +11,7 @@ use crate::terms::Basis;
 pub struct Judged {
     pub gain: Gain,
     pub null: Null,
-    /// Gains of simulated noise, nats; empty once the layer's null is known.
+    /// Gains of simulated noise, nats; empty unless the layer's null is being simulated.
     pub of_noise: Vec<f64>,
     /// Large enough beside the largest term, and larger than what fixed errors of the pixels make by
     /// chance.

@@ -1,11 +1,10 @@
 //! Null distribution of a layer's search.
 
 use super::candidate::{Candidate, RECALIBRATE};
-use super::judge::Judged;
 use super::noise_gains::NoiseGains;
 
 /// Candidates that are tested together. The catalogue's shapes are few and have few columns; changes of
-/// sigma and nameless curves are many and wide. Each group is tested at half of the layer's level.
+/// sigma and nameless curves are many and wide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
     Named,
@@ -13,7 +12,7 @@ pub enum Group {
 }
 
 impl Group {
-    pub const ALL: [Group; 2] = [Group::Named, Group::Other];
+    const ALL: [Group; 2] = [Group::Named, Group::Other];
 
     pub fn of(candidate: &Candidate) -> Self {
         let named = candidate.family.is_some_and(|id| id != RECALIBRATE);
@@ -21,43 +20,80 @@ impl Group {
     }
 }
 
-/// Largest gains under noise alone, of each group.
+/// Largest gains under noise alone, by group.
 #[derive(Debug, Clone, Default)]
-pub struct LayerNull([NoiseGains; 2]);
+pub struct LayerNull {
+    gains: [NoiseGains; 2],
+    /// Number of groups that have candidates; they share the layer's level.
+    groups: usize,
+}
 
 impl LayerNull {
-    /// Of the candidates' gains of the same draws of noise.
-    pub fn of(candidates: &[Candidate], judged: &[Option<Judged>]) -> Self {
-        let largest = |group: Group| {
-            let own = candidates.iter().zip(judged).filter(move |(c, _)| Group::of(c) == group);
-            NoiseGains::of(own.filter_map(|(_, j)| Some(&j.as_ref()?.of_noise[..])))
-        };
-        LayerNull(Group::ALL.map(largest))
+    /// Of each candidate's gains of simulated noise.
+    pub fn of<'a>(candidates: impl Iterator<Item = (Group, &'a [f64])>) -> Self {
+        let all: Vec<(Group, &[f64])> = candidates.collect();
+        let own = |group| all.iter().filter(move |(of, _)| *of == group).map(|(_, gains)| *gains);
+        LayerNull {
+            gains: Group::ALL.map(|group| NoiseGains::of(own(group))),
+            groups: Group::ALL.into_iter().filter(|group| own(*group).next().is_some()).count(),
+        }
     }
 
     /// A null in which noise brings next to nothing.
     pub fn unknown() -> Self {
-        LayerNull(Group::ALL.map(|_| NoiseGains::unknown()))
+        LayerNull::same(&NoiseGains::unknown())
+    }
+
+    /// The same null for both groups.
+    pub fn same(gains: &NoiseGains) -> Self {
+        LayerNull { gains: Group::ALL.map(|_| gains.clone()), groups: Group::ALL.len() }
     }
 
     /// Whether any noise was simulated.
     pub fn is_tested(&self) -> bool {
-        self.0.iter().any(NoiseGains::is_tested)
+        self.gains.iter().any(NoiseGains::is_tested)
     }
 
-    /// The same null for both groups.
-    #[cfg(test)]
-    pub fn same(gains: &NoiseGains) -> Self {
-        LayerNull(Group::ALL.map(|_| gains.clone()))
-    }
-
-    /// Gain in `group` for which noise, in either, has the chance `level`.
+    /// Threshold of a gain in `group`, at this group's part of the layer's `level` (Bonferroni).
     pub fn threshold(&self, group: Group, level: f64) -> f64 {
-        self.0[group as usize].threshold(level / Group::ALL.len() as f64)
+        self.gains[group as usize].threshold(level / self.parts())
     }
 
-    /// Chance that noise, in either group, brings what is as rare as `gain` is in `group`.
+    /// P-value of a gain in `group`, corrected for the number of groups (Bonferroni).
     pub fn p(&self, group: Group, gain: f64) -> f64 {
-        (Group::ALL.len() as f64 * self.0[group as usize].p(gain)).min(1.0)
+        (self.parts() * self.gains[group as usize].p(gain)).min(1.0)
+    }
+
+    fn parts(&self) -> f64 {
+        self.groups.max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::search::noise_gains::REPLICATES;
+
+    fn exponential(scale: f64) -> Vec<f64> {
+        let gain = |k: usize| -scale * (1.0 - (k + 1) as f64 / (REPLICATES + 1) as f64).ln();
+        (0..REPLICATES).map(gain).collect()
+    }
+
+    /// A candidate that is another one again adds no noise; independent noise would raise the threshold.
+    #[test]
+    fn a_candidate_given_twice_costs_nothing() {
+        let (named, other) = (exponential(1.0), exponential(2.0));
+        let once = [(Group::Named, &named[..]), (Group::Other, &other[..])];
+        let twice = [once[0], once[1], once[0], once[1]];
+        let [once, twice] = [&once[..], &twice].map(|all| LayerNull::of(all.iter().copied()));
+        for group in Group::ALL {
+            for level in [0.05, 0.01, 1e-3] {
+                let threshold = once.threshold(group, level);
+                assert_eq!(threshold, twice.threshold(group, level));
+                approx::assert_relative_eq!(once.p(group, threshold), level, max_relative = 1e-9);
+            }
+        }
+        let alone = LayerNull::of([(Group::Named, &named[..])].into_iter());
+        assert!(alone.threshold(Group::Named, 0.01) < once.threshold(Group::Named, 0.01));
     }
 }

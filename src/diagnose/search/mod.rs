@@ -216,7 +216,10 @@ impl<'a> Layer<'a> {
         let beside = trial.beside;
         if self.noise.is_none() {
             let noise = if simulates {
-                LayerNull::of(self.candidates, &judged)
+                let all = self.candidates.iter().zip(&judged);
+                LayerNull::of(
+                    all.filter_map(|(c, j)| Some((Group::of(c), &j.as_ref()?.of_noise[..]))),
+                )
             } else {
                 LayerNull::unknown()
             };
@@ -262,13 +265,13 @@ impl<'a> Layer<'a> {
                 !nameless(&chosen[k])
                     && chosen.iter().any(|c| nameless(c) && c.candidate.basis.axis() == axis)
             };
-            let concerned = (0..chosen.len()).filter(|&k| !completed(k));
-            let idlest = concerned.map(lost).min_by(|a, b| a.1.total_cmp(&b.1));
-            match idlest {
-                Some((k, lost)) if lost < self.threshold(noise, &chosen[k].candidate) => {
-                    chosen.remove(k)
-                }
-                _ => return,
+            let concerned = (0..chosen.len()).filter(|&k| !completed(k)).map(lost);
+            let beyond =
+                |(k, lost): (usize, f64)| (k, lost - self.threshold(noise, &chosen[k].candidate));
+            let needless = concerned.map(beyond).filter(|(_, beyond)| *beyond < 0.0);
+            match needless.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some((k, _)) => chosen.remove(k),
+                None => return,
             };
         }
     }

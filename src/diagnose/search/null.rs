@@ -10,7 +10,7 @@ use crate::rng::Stream;
 
 /// Distribution of a candidate's gain under noise alone: b ~ N(0, A) in every view.
 ///
-/// Computed in the eigenvectors of the summed A, where each view's A is taken as diagonal: exact if the
+/// Gains are computed in the eigenvectors of the summed A, where each view's A is taken as diagonal: exact if the
 /// views' A are multiples of one another, and a thousand times faster.
 pub struct Null {
     /// Eigenvectors of the summed A.

@@ -32,7 +32,7 @@ pub struct Chosen {
     pub best_curve: f64,
     /// All families at this step, best first, including the chosen one if it has a name.
     pub rivals: Vec<Rival>,
-    /// Chance that noise alone brings as much anywhere in this layer.
+    /// P-value under noise alone, corrected for all candidates of this layer.
     pub p: f64,
 }
 

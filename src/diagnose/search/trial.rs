@@ -38,6 +38,8 @@ pub struct NestNoise {
     /// Scores of each view, one column a draw; `None` where its samples' noise cannot be drawn.
     scores: Option<Vec<DMatrix<f64>>>,
     seed: Seed,
+    /// Name of the nest's random stream.
+    name: String,
 }
 
 impl NestNoise {
@@ -45,7 +47,7 @@ impl NestNoise {
     fn gains(&self, null: &Null, beside: &Beside, evidence: &[Evidence]) -> Vec<f64> {
         let columns = evidence.first().map_or(0, |e| e.b.len());
         let Some(scores) = &self.scores else {
-            let mut rng = self.seed.stream(&format!("diagnose/null/{columns}"));
+            let mut rng = self.seed.stream(&format!("{}/{columns}", self.name));
             return (0..REPLICATES).map(|_| null.draw(&mut rng)).collect();
         };
         let own = scores.iter().map(|all| all.rows(0, columns).into_owned()).collect();
@@ -74,7 +76,8 @@ impl Trial<'_> {
             self.views.par_iter().enumerate().map(of_view).collect();
         let of_nest = |n: usize| NestNoise {
             scores: views.iter_mut().map(|v| v[n].take()).collect(),
-            seed: Seed(seed.0.wrapping_add(n as u64)),
+            seed,
+            name: format!("diagnose/null/{n}"),
         };
         (0..nests.len()).map(of_nest).collect()
     }

@@ -10,7 +10,7 @@ use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, TABLE
 /// Candidates from the catalogue, changes of sigma itself, and nameless curves.
 pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
     let mut all = Candidate::of_catalogue(Statistic::Variance, bounds);
-    // After shapes over depth or radius; this sets the order in which the nulls are drawn.
+    // After shapes over depth or radius.
     let first = |c: &Candidate| matches!(c.basis.axis(), Axis::Z | Axis::Radius);
     all.insert(all.partition_point(first), Candidate::named(RECALIBRATE, Basis::Level));
     all.extend(recalibrations(bounds.reach, sigma));

@@ -1,7 +1,8 @@
-//! Noise of a view's samples, drawn many times, and what the candidates' columns make of it.
+//! Simulated noise of a view, and the candidates' scores on it.
 //!
 //! Candidates share samples, so noise that looks like one of them also looks like others: the largest of
-//! their gains is smaller than that of as many independent ones.
+//! their gains is smaller than that of as many independent ones. Where tiles are gathered into coarser
+//! patches, these and each grouping of the tiles have noise of their own, and the threshold is a little high.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
@@ -31,8 +32,8 @@ impl Rows<'_> {
         let weighted = DMatrix::from_fn(n, p, |i, q| self.weight[i] * nuisances[(i, q)]);
         let precision = DVector::from_column_slice(&self.precision);
         let information = self.own.view((0, 0), (p, p)) - DMatrix::from_diagonal(&precision);
-        // What merged samples no longer tell of the nuisances' scores.
-        let within = root(&(information - weighted.tr_mul(&nuisances)));
+        // The part of the nuisances' information that lies within the merged groups.
+        let within = information - weighted.tr_mul(&nuisances);
         let mut normal = || -> f64 { StandardNormal.sample(rng) };
         let roots: Vec<f64> = self.weight.iter().map(|w| w.max(0.0).sqrt()).collect();
         let mut noise = DMatrix::from_fn(n, draws, |i, _| roots[i] * normal());
@@ -42,7 +43,7 @@ impl Rows<'_> {
             _ => 0.0,
         });
         noise.gemm(1.0, &weighted, &own, 1.0);
-        let within = within * DMatrix::from_fn(p, draws, |_, _| normal());
+        let within = root(&within) * DMatrix::from_fn(p, draws, |_, _| normal()) + within * own;
         let explained = &self.inverse * (nuisances.tr_mul(&noise) + within);
         noise.gemm(-1.0, &weighted, &explained, 1.0);
         noise
@@ -113,5 +114,55 @@ impl Prepared<'_> {
         all.rows_mut(0, m).copy_from(&noise.beside);
         all.rows_mut(m, own.nrows()).copy_from(&own);
         Some(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::search::evidence::tests::{View, normal};
+    use crate::rng::Seed;
+
+    /// Drawn scores have the evidence's information as covariance: with free nuisances and nuisances with a
+    /// prior, beside chosen terms, and where samples that a candidate cannot tell apart are merged though
+    /// their nuisances differ. Six standard errors of a variance from so many draws.
+    #[test]
+    fn scores_of_noise_scatter_by_their_information() {
+        const DRAWS: usize = 20_000;
+        const KEYS: usize = 12;
+        let mut rng = Seed(3).stream("view-noise");
+        for chosen in [0, 2] {
+            let mut view = View::draw(120, chosen, 3, &mut rng);
+            let by_key = DMatrix::from_fn(KEYS, 3, |_, _| normal(&mut rng));
+            let shared = DMatrix::from_fn(KEYS, view.x.ncols(), |_, _| normal(&mut rng));
+            for i in 0..120 {
+                view.candidate.set_row(i, &by_key.row(i % KEYS));
+                let own = view.x.row(i) + shared.row(i % KEYS);
+                view.x.set_row(i, &own);
+            }
+            let rows = view.rows();
+            let merged = rows.grouped(KEYS, |i| i % KEYS);
+            let information = view.evidence().a;
+            let fill = |columns: &DMatrix<f64>, i: usize, g: &mut [f64]| {
+                g.iter_mut().zip(columns.row(i).iter()).for_each(|(g, x)| *g = *x);
+            };
+            let noise = rows.noise(DRAWS, &mut rng);
+            let own = rows.scores(3, |i, g| fill(&view.candidate, i, g), &noise);
+            let mut scores = rows.chosen_scores(&noise).insert_rows(chosen, 3, 0.0);
+            scores.rows_mut(chosen, 3).copy_from(&own);
+            assert_covariance(&scores, &information);
+            let noise = merged.noise(DRAWS, &mut rng);
+            let scores = merged.scores(3, |k, g| fill(&by_key, k, g), &noise);
+            let alone = information.view((chosen, chosen), (3, 3)).into_owned();
+            assert_covariance(&scores, &alone);
+        }
+    }
+
+    fn assert_covariance(scores: &DMatrix<f64>, information: &DMatrix<f64>) {
+        let root = information.clone().cholesky().expect("columns that differ").l();
+        let white = root.solve_lower_triangular(scores).expect("information");
+        let covariance = &white * white.transpose() / scores.ncols() as f64;
+        let off = (covariance - DMatrix::identity(root.nrows(), root.nrows())).amax();
+        assert!(off < 0.06, "{off}");
     }
 }

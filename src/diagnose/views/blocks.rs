@@ -62,13 +62,15 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
             continue;
         }
         let worth = repeated * view.frames / view.correlation.sum_of_squares;
+        let within = repeated * view.frames / view.correlation.sum_of_squares_within(n.sqrt());
         let mut place = view.places[group[0]];
         place.average(&view.places, &|of| sum(of) / n);
         // Variances add up, and shot noise is proportional to 1 / light.
         place.light = n / sum(&|i| 1.0 / view.places[i].light);
         Arc::make_mut(&mut blocks.places).push(place);
-        // The mean of log chi^2 / n is about -1 / n.
-        blocks.response.push((ratio / repeated / kept.max(0.5)).ln() + 1.0 / worth);
+        // The mean of log chi^2 / n is about -1 / n. Pixels correlate with others outside the block, which
+        // lowers the information of all blocks together but not that of one.
+        blocks.response.push((ratio / repeated / kept.max(0.5)).ln() + 1.0 / within);
         blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.log_variance_inflation);
         blocks.nuisance.push(1.0);
     }
