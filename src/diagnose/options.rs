@@ -7,7 +7,7 @@ use crate::rng::Seed;
 #[derive(Debug, Clone, Copy)]
 pub struct DiagnoseOptions {
     pub seed: Seed,
-    /// Nominal false-alarm rate, divided among the tests. The shares add up to 1.35: about 2.7 % of clean
+    /// Nominal false-alarm rate, divided among the tests. The shares add up to 1.25: 3 % of clean
     /// recordings if all tests were independent.
     pub level: f64,
     /// Whether the model was calibrated on this very recording, with all causes present: sigma is then
@@ -21,7 +21,7 @@ impl Default for DiagnoseOptions {
     fn default() -> Self {
         DiagnoseOptions {
             seed: Seed(1),
-            level: 0.02,
+            level: 0.024,
             calibrated_here: false,
             ablation: Ablation::None,
         }
@@ -46,7 +46,7 @@ pub const MIN_VIEWS: usize = 3;
 pub const FRAMES_KEPT: usize = 4;
 
 /// Share of the overall false-alarm rate for each of some 20 tests beside the searches.
-pub const EACH_LEVEL: f64 = 0.03;
+pub const EACH_LEVEL: f64 = 0.025;
 /// The 80 % quantile of a standard normal distribution.
 pub const POWER_80: f64 = 0.84;
 

@@ -74,7 +74,7 @@ fn names(diagnosis: &Value) -> Vec<&str> {
 }
 
 /// Nearly frozen noise is measured alike in both recordings, whichever side of a limit its changes fall on.
-/// Six pairs of runs at 2.7 % false alarms: two alarms have a probability of 1.0 %.
+/// Six pairs of runs at 3 % false alarms: two alarms have a probability of 1.2 %.
 #[test]
 #[ignore = "slow: six pairs of recordings"]
 fn two_runs_of_noise_that_stands_still_match() {
