@@ -80,7 +80,7 @@ pub fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
 }
 
 /// Fills the columns of several terms, one after the other.
-fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
+pub(super) fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
     let mut rest = row;
     for basis in terms {
         let (mine, others) = rest.split_at_mut(basis.count());

@@ -1,6 +1,6 @@
 //! Trials of candidates alongside the chosen terms.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::beside::Beside;
@@ -12,6 +12,7 @@ use super::null::Null;
 use super::outcome::Chosen;
 use super::prepared::{Patches, Prepared};
 use super::rules::Rules;
+use super::view_noise::Scores;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
@@ -36,7 +37,7 @@ pub struct Trial<'a> {
 /// Noise as a nest's widest candidate sees it.
 pub struct NestNoise {
     /// Scores of each view, one column a draw; `None` where its samples' noise cannot be drawn.
-    scores: Option<Vec<DMatrix<f64>>>,
+    scores: Option<Vec<Scores>>,
     seed: Seed,
     /// Name of the nest's random stream.
     name: String,
@@ -50,7 +51,7 @@ impl NestNoise {
             let mut rng = self.seed.stream(&format!("{}/{columns}", self.name));
             return (0..REPLICATES).map(|_| null.draw(&mut rng)).collect();
         };
-        let own = scores.iter().map(|all| all.rows(0, columns).into_owned()).collect();
+        let own = scores.iter().map(|all| all.rows(0, columns).map(f64::from)).collect();
         null.gains(&beside.scores(evidence, own))
     }
 }
@@ -67,12 +68,12 @@ impl Trial<'_> {
         nests: &[Vec<usize>],
         seed: Seed,
     ) -> Vec<NestNoise> {
+        let widest: Vec<&Basis> = nests.iter().map(|nest| &candidates[nest[0]].basis).collect();
         let of_view = |(v, view): (usize, &Prepared<'_>)| {
             let noise = view.noise(REPLICATES, &mut seed.stream(&format!("diagnose/noise/{v}")));
-            let scores = |nest: &Vec<usize>| view.noise_scores(&candidates[nest[0]].basis, &noise);
-            nests.iter().map(scores).collect::<Vec<_>>()
+            view.noise_scores(&widest, &noise)
         };
-        let mut views: Vec<Vec<Option<DMatrix<f64>>>> =
+        let mut views: Vec<Vec<Option<Scores>>> =
             self.views.par_iter().enumerate().map(of_view).collect();
         let of_nest = |n: usize| NestNoise {
             scores: views.iter_mut().map(|v| v[n].take()).collect(),

@@ -4,14 +4,14 @@
 //! their gains is smaller than that of as many independent ones. Where tiles are gathered into coarser
 //! patches, these and each grouping of the tiles have noise of their own, and the threshold is a little high.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::evidence::root;
-use super::prepared::{Grouping, Patches, Prepared};
+use super::prepared::{Grouping, Patches, Prepared, fill_all};
 use super::rows::Rows;
 use crate::rng::Stream;
-use crate::terms::Basis;
+use crate::terms::{Basis, PixelContext};
 
 /// Noise of one view; one column per draw.
 pub struct ViewNoise {
@@ -21,6 +21,19 @@ pub struct ViewNoise {
     groups: Vec<DMatrix<f64>>,
     /// Scores of the terms fitted alongside every candidate.
     beside: DMatrix<f64>,
+}
+
+/// Scores by column and draw; there are many, of which three digits matter.
+pub type Scores = DMatrix<f32>;
+
+impl ViewNoise {
+    /// Puts the scores of the terms alongside before a candidate's.
+    fn with_beside(&self, own: &DMatrixView<'_, f64>) -> Scores {
+        let m = self.beside.nrows();
+        DMatrix::from_fn(m + own.nrows(), own.ncols(), |j, draw| {
+            (if j < m { self.beside[(j, draw)] } else { own[(j - m, draw)] }) as f32
+        })
+    }
 }
 
 impl Rows<'_> {
@@ -96,9 +109,37 @@ impl Prepared<'_> {
         }
     }
 
-    /// Scores of the noise on the terms fitted alongside and the basis, one row per column of these. `None`
-    /// for a basis that is tried on finer samples than the noise was drawn for.
-    pub fn noise_scores(&self, basis: &Basis, noise: &ViewNoise) -> Option<DMatrix<f64>> {
+    /// Scores of the noise on the terms fitted alongside and each basis: one row per column of these, one
+    /// column per draw. `None` for a basis that is tried on finer samples than the noise was drawn for.
+    pub fn noise_scores(&self, bases: &[&Basis], noise: &ViewNoise) -> Vec<Option<Scores>> {
+        let mut scores = vec![None; bases.len()];
+        let samples = |basis: &Basis| self.drawn(basis, noise);
+        let mut left: Vec<usize> =
+            (0..bases.len()).filter(|&k| samples(bases[k]).is_some()).collect();
+        // Those that are tried on the same samples are multiplied at once.
+        while let Some((places, rows, drawn)) = left.first().and_then(|&k| samples(bases[k])) {
+            let same = |k: &usize| samples(bases[*k]).is_some_and(|(.., d)| std::ptr::eq(d, drawn));
+            let (mine, others): (Vec<usize>, Vec<usize>) = left.into_iter().partition(same);
+            left = others;
+            let of: Vec<&Basis> = mine.iter().map(|&k| bases[k]).collect();
+            let count = of.iter().map(|b| b.count()).sum();
+            let all = rows.scores(count, |i, g| fill_all(&of, &places[i], g), drawn);
+            let mut first = 0;
+            for k in mine {
+                let own = all.rows(first, bases[k].count());
+                first += own.nrows();
+                scores[k] = Some(noise.with_beside(&own));
+            }
+        }
+        scores
+    }
+
+    /// Samples that a basis is tried on, with their noise.
+    fn drawn<'n>(
+        &self,
+        basis: &Basis,
+        noise: &'n ViewNoise,
+    ) -> Option<(&[PixelContext], &Rows<'_>, &'n DMatrix<f64>)> {
         let (places, rows, patches) = self.samples(basis);
         let group = self.groups.iter().position(|(_, of)| std::ptr::eq(of, rows));
         // The scores of the terms alongside are those of the coarse samples' noise.
@@ -108,12 +149,7 @@ impl Prepared<'_> {
             (Patches::Fine, Some(g)) => Some(&noise.groups[g]).filter(|_| is_joint)?,
             (Patches::Fine, None) => Some(&noise.samples).filter(|_| self.is_one_size)?,
         };
-        let own = rows.scores(basis.count(), |i, g| basis.fill(&places[i], g), drawn);
-        let m = noise.beside.nrows();
-        let mut all = DMatrix::zeros(m + own.nrows(), own.ncols());
-        all.rows_mut(0, m).copy_from(&noise.beside);
-        all.rows_mut(m, own.nrows()).copy_from(&own);
-        Some(all)
+        Some((places, rows, drawn))
     }
 }
 
