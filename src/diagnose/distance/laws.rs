@@ -1,17 +1,13 @@
 //! Laws of distance error, fitted to views whose distance was measured by other means.
 
-use nalgebra::{DMatrix, DVector};
-use rand_distr::{Distribution, StandardNormal};
+use nalgebra::DVector;
 
 use super::referenced_view::{ReferencedView, Scatter, is_tilted};
 use super::warm_up::warm_up;
 use crate::diagnose::checks::replication::Halves;
 use crate::diagnose::joint::anchor::Family;
-use crate::diagnose::search::beside::Beside;
 use crate::diagnose::search::evidence::{Evidence, gain};
-use crate::diagnose::search::noise_gains::REPLICATES;
 use crate::diagnose::search::null::Null;
-use crate::rng::Seed;
 use crate::terms::Axis;
 
 /// A law of distance error.
@@ -31,9 +27,7 @@ pub struct Law {
     pub gain: f64,
     /// Coefficient and its standard error.
     pub estimate: [f64; 2],
-    pub dispersion: f64,
-    /// Gains of simulated errors of the references, the same for all laws, nats.
-    pub of_noise: Vec<f64>,
+    pub null: Null,
     /// Degrees of freedom of the estimate of the references' error.
     pub freedom: f64,
     /// Whether both halves of the references say the same.
@@ -60,16 +54,10 @@ struct References<'a> {
     /// Shift of each view by one unit of each nuisance, m.
     others: Vec<Vec<f64>>,
     scatter: Scatter,
-    /// Simulated errors of each reference, in standard deviations.
-    noise: Vec<DMatrix<f64>>,
 }
 
 impl<'a> References<'a> {
-    fn of(
-        checked: &'a [ReferencedView],
-        Nuisances { bent_m, open }: &Nuisances,
-        seed: Seed,
-    ) -> Self {
+    fn of(checked: &'a [ReferencedView], Nuisances { bent_m, open }: &Nuisances) -> Self {
         let angles = if is_tilted(checked) { 2 } else { 0 };
         let bent = (*bent_m > 0.0).then_some(*bent_m);
         let others = |c: &ReferencedView| -> Vec<f64> {
@@ -77,18 +65,16 @@ impl<'a> References<'a> {
             angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
         };
         let scatter = Scatter::of(checked);
-        let mut rng = seed.stream("laws/noise");
-        let mut errors = || DMatrix::from_fn(1, REPLICATES, |_, _| StandardNormal.sample(&mut rng));
-        let noise = checked.iter().map(|_| errors()).collect();
-        References { checked, others: checked.iter().map(others).collect(), scatter, noise }
+        References { checked, others: checked.iter().map(others).collect(), scatter }
     }
 
     /// Evidence on the nuisances, and on a law that moves the views so far.
-    fn evidence(&self, law: &dyn Fn(&ReferencedView) -> f64) -> Vec<Evidence> {
+    fn evidence(&self, law: Option<&dyn Fn(&ReferencedView) -> f64>) -> Vec<Evidence> {
         let of = |(n, c): (usize, &ReferencedView)| {
+            let law = law.map(|moves| moves(c));
             let g = DVector::from_iterator(
-                self.others[n].len() + 1,
-                self.others[n].iter().copied().chain([law(c)]),
+                self.others[n].len() + usize::from(law.is_some()),
+                self.others[n].iter().copied().chain(law),
             );
             let variance = self.scatter.variances[n];
             Evidence { a: &g * g.transpose() / variance, b: g * (c.off / variance) }
@@ -105,25 +91,19 @@ impl<'a> References<'a> {
     ) -> Option<Law> {
         let checked = self.checked;
         let beside = self.others.first().map_or(0, Vec::len);
-        let views = self.evidence(&moves);
+        let views = self.evidence(Some(&moves));
         let moves: Vec<f64> = checked.iter().map(moves).collect();
-        let together = gain(&views, PRIOR)?;
-        let beta = together.beta[beside];
+        let mut gain = gain(&views, PRIOR)?;
+        if beside > 0 {
+            gain.total -= self::gain(&self.evidence(None), PRIOR).map_or(0.0, |alone| alone.total);
+        }
+        let beta = gain.beta[beside];
         let rms = |of: &dyn Fn(usize) -> f64| {
             let squares: f64 = (0..checked.len()).map(|n| of(n).powi(2)).sum();
             (squares / checked.len() as f64).sqrt()
         };
         let second: Vec<bool> = checked.iter().map(|c| c.in_second_half).collect();
         let halves = Halves::of(&views, &second, PRIOR, &vec![1; beside + 1]);
-        let score = |(n, noise): (usize, &DMatrix<f64>)| {
-            let own = self.others[n].iter().copied().chain([moves[n]]);
-            let column = DVector::from_iterator(beside + 1, own);
-            column / self.scatter.variances[n].sqrt() * noise
-        };
-        let scores = self.noise.iter().enumerate().map(score).collect();
-        let fit = Beside::of(&views, beside, PRIOR)?;
-        let alone = fit.alone(&views);
-        let null = Null::of_candidate(&alone, PRIOR)?;
         Some(Law {
             family,
             axis,
@@ -135,10 +115,9 @@ impl<'a> References<'a> {
             rms_sigma: rms(&|n| beta * moves[n] / checked[n].sigma_m),
             rms_errors: rms(&|n| beta * moves[n] / self.scatter.variances[n].sqrt()),
             settled: Vec::new(),
-            gain: gain(&alone, PRIOR)?.total,
-            estimate: [beta, together.covariance[(beside, beside)].sqrt()],
-            dispersion: null.dispersion,
-            of_noise: null.gains(&fit.scores(&views, scores)),
+            gain: gain.total,
+            estimate: [beta, gain.covariance[(beside, beside)].sqrt()],
+            null: Null::of(&views, beside, PRIOR)?,
             freedom: self.scatter.freedom.max(1.0),
             replicated: halves.and_then(|h| h.replicate_beside(&[beside])),
         })
@@ -146,11 +125,11 @@ impl<'a> References<'a> {
 }
 
 /// Fits all laws, with their gains on references left out; none where there are too few references.
-pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances, seed: Seed) -> Vec<Law> {
+pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
     if checked.len() < MIN_VIEWS {
         return Vec::new();
     }
-    let mut references = References::of(checked, nuisances, seed);
+    let mut references = References::of(checked, nuisances);
     let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.without_law()));
     if nuisances.open.is_empty() {
         laws.extend(references.law("disparity-offset", Axis::Z, ReferencedView::moved_by_a_px));
@@ -164,7 +143,7 @@ pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances, seed: Seed) -> Ve
     let wider = *freedom / (*freedom - 2.0).max(1.0);
     variances.iter_mut().for_each(|v| *v *= wider);
     let session_s = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
-    if let Some(warm_up) = warm_up(session_s, |moves| references.evidence(moves)) {
+    if let Some(warm_up) = warm_up(session_s, |moves| references.evidence(Some(moves))) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {
             law.estimate = warm_up.relative;
             law.settled = vec![("time_constant_s", warm_up.time_constant_s)];

@@ -9,12 +9,13 @@ use crate::diagnose::finding::naming::MIN_PROBABILITY;
 use crate::diagnose::finding::other_findings::{named, nameless};
 use crate::diagnose::finding::parameters::{estimate, one};
 use crate::diagnose::joint::anchor::{Family, families};
-use crate::diagnose::search::noise_gains::NoiseGains;
+use crate::diagnose::search::noise_gains::{NoiseGains, REPLICATES};
 use crate::diagnose::search::null::student;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::learnt::Learnt;
 use crate::effects;
+use crate::rng::Seed;
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, Term};
 
@@ -35,16 +36,27 @@ pub fn bent_m(found: &[Finding]) -> f64 {
 
 /// Findings from the references, if any.
 /// `excess` is how far the variance of the levels may exceed their own errors, as a factor.
-pub fn findings(laws: &[Law], known: &KnownTerms, excess: f64, level: f64) -> Vec<Finding> {
+pub fn findings(
+    laws: &[Law],
+    known: &KnownTerms,
+    excess: f64,
+    level: f64,
+    seed: Seed,
+) -> Vec<Finding> {
     // An error estimated from few references makes a Student's t of a Gaussian.
     let calibrated_gain = |l: &Law| {
-        let gain = (l.gain / l.dispersion / excess).max(0.0);
+        let gain = (l.gain / l.null.dispersion / excess).max(0.0);
         student(gain, l.freedom)
     };
     let Some(best) = laws.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
         return Vec::new();
     };
-    let noise = NoiseGains::of(laws.iter().map(|l| &l.of_noise[..]));
+    let gains = |(n, law): (usize, &Law)| {
+        let mut rng = seed.stream(&format!("laws/null/{n}"));
+        (0..REPLICATES).map(|_| law.null.draw(&mut rng)).collect::<Vec<f64>>()
+    };
+    let of_noise: Vec<Vec<f64>> = laws.iter().enumerate().map(gains).collect();
+    let noise = NoiseGains::of(of_noise.iter().map(|gains| &gains[..]));
     // A model learnt from references may itself lack a law of this size.
     let clear = best.rms_errors > CLEAR_LAW_ERRORS * excess.sqrt() && best.rms_m > MIN_M;
     if !clear || calibrated_gain(best) < noise.threshold(level) {
@@ -148,10 +160,10 @@ impl Case<'_> {
         let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
         let found = |terms: &[Term], beside: &Nuisances| {
             let checked = referenced_views(&self.fields, &self.survey, terms, &self.known);
-            let mut laws = laws(&checked, beside, self.options.seed);
+            let mut laws = laws(&checked, beside);
             laws.retain(|l| can_happen(l.family, self.sensor().kind));
             let level = self.level(Self::LAWS_LEVEL);
-            findings(&laws, &self.known, excess, level)
+            findings(&laws, &self.known, excess, level, self.options.seed)
         };
         // A bowl moves the plane on the axis too, by an unknown constant.
         let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);

@@ -228,8 +228,10 @@ impl<'a> Layer<'a> {
             self.noise = Some(noise);
         }
         let noise = self.noise.as_ref()?;
-        let (candidates, rules) = (self.candidates, self.rules);
-        let mut next = Choice { candidates, judged: &judged, rules, noise }.best(&beside)?;
+        let candidates = self.candidates;
+        let rules = if chosen.is_empty() { *self.rules } else { self.rules.later() };
+        let mut next =
+            Choice { candidates, judged: &judged, rules: &rules, noise }.best(&beside)?;
         period::tune(candidates, chosen, &mut next, |terms| self.total(terms));
         Some(next)
     }

@@ -8,7 +8,7 @@ use crate::terms::Basis;
 
 impl Layer<'_> {
     fn threshold(&self, noise: &LayerNull, candidate: &Candidate) -> f64 {
-        noise.threshold(Group::of(candidate), self.rules.level)
+        noise.threshold(Group::of(candidate), self.rules.later().level)
     }
 
     /// Drops terms that bring no more than noise given the others, such as one chosen before the real
