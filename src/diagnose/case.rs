@@ -10,6 +10,7 @@ use super::noise::lines::LearntLines;
 use super::noise::still::{KeptPattern, beside_bias, still};
 use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
+use super::search::rules::LATER_LEVEL;
 use super::steps::lattice;
 use super::steps::lattice::Quantisation;
 use super::views::column_steps::column_steps;
@@ -180,9 +181,14 @@ impl<'a> Case<'a> {
         share * self.options.level
     }
 
+    /// The same for a search: beside what a first run found, further terms are tested as in the first run.
+    pub fn search_level(&self, share: f64) -> f64 {
+        self.level(share) * if self.extended { LATER_LEVEL } else { 1.0 }
+    }
+
     pub fn mean(&mut self) -> MeanResult {
         self.at("searching the mean error", "testing the mean again");
-        let (camera, level) = (&self.sensor().camera, self.level(Self::MEAN_LEVEL));
+        let (camera, level) = (&self.sensor().camera, self.search_level(Self::MEAN_LEVEL));
         let seed = self.options.seed;
         let mut fine = self.survey.mean_data();
         let mut found = self.survey.search_bias(&fine, camera, level, seed);

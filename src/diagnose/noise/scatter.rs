@@ -61,7 +61,7 @@ impl Case<'_> {
         if self.baseline.is_some() && !compared {
             self.survey.forget_noise_beyond(&self.model.sigma);
         }
-        let level = self.level(Self::VARIANCE_LEVEL);
+        let level = self.search_level(Self::VARIANCE_LEVEL);
         let sigma = &self.model.sigma;
         if self.survey.learnt_from[1].is_some() {
             self.survey.absorb_model_variance_error(&self.known, sigma);
