@@ -181,7 +181,7 @@ impl<'a> Case<'a> {
         share * self.options.level
     }
 
-    /// The same for a search: beside what a first run found, further terms are tested as in the first run.
+    /// The same for a search: the second run's terms are beside what the first found.
     pub fn search_level(&self, share: f64) -> f64 {
         self.level(share) * if self.extended { LATER_LEVEL } else { 1.0 }
     }

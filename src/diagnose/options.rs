@@ -45,7 +45,7 @@ pub const MIN_VIEWS: usize = 3;
 /// Number of single frames kept: enough for correlations in time.
 pub const FRAMES_KEPT: usize = 4;
 
-/// Share of the overall false-alarm rate for each of some 20 tests beside the searches.
+/// Share of the nominal false-alarm rate for each of some 20 tests beside the searches.
 pub const EACH_LEVEL: f64 = 0.025;
 /// The 80 % quantile of a standard normal distribution.
 pub const POWER_80: f64 = 0.84;

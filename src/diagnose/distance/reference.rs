@@ -9,7 +9,7 @@ use crate::diagnose::finding::naming::MIN_PROBABILITY;
 use crate::diagnose::finding::other_findings::{named, nameless};
 use crate::diagnose::finding::parameters::{estimate, one};
 use crate::diagnose::joint::anchor::{Family, families};
-use crate::diagnose::search::noise_gains::{NoiseGains, REPLICATES};
+use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::student;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
@@ -51,12 +51,10 @@ pub fn findings(
     let Some(best) = laws.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
         return Vec::new();
     };
-    let gains = |(n, law): (usize, &Law)| {
-        let mut rng = seed.stream(&format!("laws/null/{n}"));
-        (0..REPLICATES).map(|_| law.null.draw(&mut rng)).collect::<Vec<f64>>()
-    };
-    let of_noise: Vec<Vec<f64>> = laws.iter().enumerate().map(gains).collect();
-    let noise = NoiseGains::of(of_noise.iter().map(|gains| &gains[..]));
+    let draws =
+        |(n, law): (usize, &Law)| law.null.draws(&mut seed.stream(&format!("laws/null/{n}")));
+    let of_noise: Vec<Vec<f64>> = laws.iter().enumerate().map(draws).collect();
+    let noise = NoiseGains::of(of_noise.iter().map(Vec::as_slice));
     // A model learnt from references may itself lack a law of this size.
     let clear = best.rms_errors > CLEAR_LAW_ERRORS * excess.sqrt() && best.rms_m > MIN_M;
     if !clear || calibrated_gain(best) < noise.threshold(level) {

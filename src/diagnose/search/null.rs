@@ -5,13 +5,14 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::beside::Beside;
 use super::evidence::Evidence;
+use super::noise_gains::REPLICATES;
 use super::rules::Rules;
 use crate::rng::Stream;
 
 /// Distribution of a candidate's gain under noise alone: b ~ N(0, A) in every view.
 ///
-/// Gains are computed in the eigenvectors of the summed A, where each view's A is taken as diagonal: exact if the
-/// views' A are multiples of one another, and a thousand times faster.
+/// Gains are computed in the eigenvectors of the summed A, where each view's A is taken as diagonal: exact
+/// if the views' A are multiples of one another, and a thousand times faster.
 pub struct Null {
     /// Eigenvectors of the summed A.
     axes: DMatrix<f64>,
@@ -98,6 +99,11 @@ impl Null {
             gain += self.gain_along(views, *total, &b);
         }
         gain
+    }
+
+    /// Draws the gains of as many recordings as a null is simulated by.
+    pub fn draws(&self, rng: &mut Stream) -> Vec<f64> {
+        (0..REPLICATES).map(|_| self.draw(rng)).collect()
     }
 
     /// Gains of recordings with these scores, nats: one matrix a view, one column a recording.

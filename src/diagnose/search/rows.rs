@@ -13,7 +13,6 @@ pub struct Rows<'a> {
     pub(super) weight: Cow<'a, [f64]>,
     /// One row per sample: nuisances, then the chosen terms' columns, then the response.
     samples: Vec<f64>,
-    pub(super) nuisances: usize,
     /// Prior precision of each nuisance about zero; 0 for a free one.
     pub(super) precision: Vec<f64>,
     /// Number of nuisance and chosen-term columns.
@@ -49,7 +48,7 @@ impl<'a> Rows<'a> {
         }
         let inverse = own.view((0, 0), (p, p)).into_owned().try_inverse()?;
         let (weight, precision) = (Cow::Borrowed(weight), precision.to_vec());
-        Some(Rows { weight, samples, nuisances: p, precision, width, own, seen, inverse })
+        Some(Rows { weight, samples, precision, width, own, seen, inverse })
     }
 
     /// Merges samples that share a key; exact for columns that depend on the key alone.
@@ -68,13 +67,17 @@ impl<'a> Rows<'a> {
         }
         let (own, seen, inverse) = (self.own.clone(), self.seen.clone(), self.inverse.clone());
         let (weight, precision) = (Cow::Owned(weight), self.precision.clone());
-        let (nuisances, width) = (self.nuisances, self.width);
-        Rows { weight, samples, nuisances, precision, width, own, seen, inverse }
+        Rows { weight, samples, precision, width: self.width, own, seen, inverse }
+    }
+
+    /// Number of nuisances.
+    pub(super) fn nuisances(&self) -> usize {
+        self.precision.len()
     }
 
     /// Weighted sum of squares that the nuisances explain.
     pub fn explained(&self) -> f64 {
-        let p = self.nuisances;
+        let p = self.nuisances();
         let seen = self.seen.rows(0, p);
         (&self.inverse * seen).dot(&seen)
     }
@@ -118,7 +121,7 @@ impl<'a> Rows<'a> {
             }
         }
         let mut sum = self.nothing(count);
-        let m = self.width - self.nuisances;
+        let m = self.width - self.nuisances();
         sum.a
             .view_mut((m, m), (count, count))
             .copy_from(&DMatrix::from_row_slice(count, count, &a));
@@ -129,7 +132,7 @@ impl<'a> Rows<'a> {
 
     /// Zero evidence on the chosen terms and `count` columns.
     fn nothing(&self, count: usize) -> Evidence {
-        Evidence::zeros(self.width - self.nuisances + count)
+        Evidence::zeros(self.width - self.nuisances() + count)
     }
 
     /// Like [`Rows::reduce`], for many columns of which neighbouring samples touch the same few.
@@ -182,7 +185,7 @@ impl<'a> Rows<'a> {
         block: impl Fn(usize) -> usize,
         mut rows: impl FnMut(usize, &[(usize, usize)], &mut Vec<f64>) -> Vec<usize>,
     ) -> DMatrix<f64> {
-        let m = self.width - self.nuisances;
+        let m = self.width - self.nuisances();
         let mut cross = DMatrix::<f64>::zeros(self.width + 1, sum.b.len() - m);
         let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
         order.sort_unstable();
@@ -226,7 +229,7 @@ impl<'a> Rows<'a> {
     /// Adds the chosen terms' normal equations and their products with the candidate's columns,
     /// `cross`, and profiles out the nuisances. Only the lower triangle is kept.
     fn profile(&self, sum: &mut Evidence, cross: &DMatrix<f64>) {
-        let (p, count) = (self.nuisances, cross.ncols());
+        let (p, count) = (self.nuisances(), cross.ncols());
         let m = self.width - p;
         let n = m + count;
         let chosen = self.own.view((p, p), (m, m));

@@ -35,24 +35,26 @@ pub struct Trial<'a> {
 }
 
 /// Noise as a nest's widest candidate sees it.
-pub struct NestNoise {
-    /// Scores of each view, one column a draw; `None` where its samples' noise cannot be drawn.
-    scores: Option<Vec<Scores>>,
-    seed: Seed,
-    /// Name of the nest's random stream.
-    name: String,
+pub enum NestNoise {
+    /// Scores of each view, one column a draw.
+    Shared(Vec<Scores>),
+    /// The noise of the samples it is tried on was not drawn: seed and name of the nest's own stream.
+    Apart(Seed, String),
 }
 
 impl NestNoise {
     /// Gains of the candidate whose `null` and `evidence` these are.
     fn gains(&self, null: &Null, beside: &Beside, evidence: &[Evidence]) -> Vec<f64> {
         let columns = evidence.first().map_or(0, |e| e.b.len());
-        let Some(scores) = &self.scores else {
-            let mut rng = self.seed.stream(&format!("{}/{columns}", self.name));
-            return (0..REPLICATES).map(|_| null.draw(&mut rng)).collect();
-        };
-        let own = scores.iter().map(|all| all.rows(0, columns).map(f64::from)).collect();
-        null.gains(&beside.scores(evidence, own))
+        match self {
+            NestNoise::Shared(scores) => {
+                let own = scores.iter().map(|all| all.rows(0, columns).map(f64::from)).collect();
+                null.gains(&beside.scores(evidence, own))
+            }
+            NestNoise::Apart(seed, name) => {
+                null.draws(&mut seed.stream(&format!("{name}/{columns}")))
+            }
+        }
     }
 }
 
@@ -75,10 +77,10 @@ impl Trial<'_> {
         };
         let mut views: Vec<Vec<Option<Scores>>> =
             self.views.par_iter().enumerate().map(of_view).collect();
-        let of_nest = |n: usize| NestNoise {
-            scores: views.iter_mut().map(|v| v[n].take()).collect(),
-            seed,
-            name: format!("diagnose/null/{n}"),
+        let of_nest = |n: usize| {
+            let scores: Option<Vec<Scores>> = views.iter_mut().map(|v| v[n].take()).collect();
+            let apart = || NestNoise::Apart(seed, format!("diagnose/null/{n}"));
+            scores.map_or_else(apart, NestNoise::Shared)
         };
         (0..nests.len()).map(of_nest).collect()
     }

@@ -40,7 +40,7 @@ impl Rows<'_> {
     /// Draws the noise so many times, weighted and with the nuisances profiled out: one row per sample. Its
     /// products with columns are scores of their information's covariance.
     fn noise(&self, draws: usize, rng: &mut Stream) -> DMatrix<f64> {
-        let (n, p) = (self.weight.len(), self.nuisances);
+        let (n, p) = (self.weight.len(), self.nuisances());
         let nuisances = DMatrix::from_fn(n, p, |i, q| self.sample(i)[q]);
         let weighted = DMatrix::from_fn(n, p, |i, q| self.weight[i] * nuisances[(i, q)]);
         let precision = DVector::from_column_slice(&self.precision);
@@ -64,7 +64,7 @@ impl Rows<'_> {
 
     /// Scores of such noise on the chosen terms.
     fn chosen_scores(&self, noise: &DMatrix<f64>) -> DMatrix<f64> {
-        let (p, m) = (self.nuisances, self.width - self.nuisances);
+        let (p, m) = (self.nuisances(), self.width - self.nuisances());
         DMatrix::from_fn(m, self.weight.len(), |j, i| self.sample(i)[p + j]) * noise
     }
 
