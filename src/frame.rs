@@ -73,18 +73,24 @@ impl DepthCode {
 
     /// The raw value nearest to the depth `z` (m), or the one for "no measurement" when none fits.
     pub fn raw(&self, z: f64) -> u16 {
-        let (exact, invalid, top) = match *self {
-            DepthCode::Metric { units_per_metre, invalid } => {
-                (z * units_per_metre, invalid, 65535.0)
-            }
+        let (exact, invalid) = match *self {
+            DepthCode::Metric { units_per_metre, invalid } => (z * units_per_metre, invalid),
             DepthCode::Disparity { offset, slope, invalid } => {
-                // A Kinect's words have 11 bits, and the last of them is no measurement.
-                let top = if invalid == KINECT_NO_MEASUREMENT { invalid } else { u16::MAX };
-                ((1.0 / z - offset) / slope, invalid, f64::from(top))
+                ((1.0 / z - offset) / slope, invalid)
             }
         };
         let rounded = exact.round();
-        if z > 0.0 && rounded > 0.0 && rounded < top { rounded as u16 } else { invalid }
+        let stored = z > 0.0 && rounded > 0.0 && rounded < f64::from(self.end());
+        if stored { rounded as u16 } else { invalid }
+    }
+
+    /// First raw value past those that a depth is stored as.
+    pub fn end(&self) -> u16 {
+        match *self {
+            // A Kinect's raw values have 11 bits, and the last of them is no measurement.
+            DepthCode::Disparity { invalid: KINECT_NO_MEASUREMENT, .. } => KINECT_NO_MEASUREMENT,
+            _ => u16::MAX,
+        }
     }
 
     /// One step of the code at depth `z`, in inverse depth (1/m).

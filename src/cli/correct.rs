@@ -1,16 +1,14 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::Args;
 use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
-use kinoise::effects::Active;
 use kinoise::io::{DESCRIPTION, Leaves, OutputFolder, refuse_nested};
 use kinoise::units::counted;
 use kinoise::{DepthCode, NoiseModel};
 
 use super::common::{Global, Input};
 use super::console::{beside, detail_model, next_step, notes, result, say, working};
-use super::output::begin;
+use super::output::{UNCERTAINTY, begin};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -40,17 +38,16 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let model = NoiseModel::read(&arguments.model)?;
     detail_model(&model, Some(&arguments.model));
-    // Checked here, where the error can name the file.
-    Active::all_of_model(&model.effects).with_context(|| arguments.model.display().to_string())?;
     let recording: &Path = &arguments.recording;
     let assumed = arguments.input.assumed()?;
     let inputs: [&Path; 2] = [recording, &arguments.model];
-    let new = |place: &Path| begin(place, Leaves::Recording, &inputs, global);
+    let new = |place: &Path, leaves| begin(place, leaves, &inputs, global);
     if let Some(sigma) = &arguments.sigma {
         refuse_nested(sigma, &arguments.output)?;
     }
-    let output = new(&arguments.output)?;
-    let uncertainty = arguments.sigma.as_deref().map(new).transpose()?;
+    let output = new(&arguments.output, Leaves::RECORDING)?;
+    let sigma = arguments.sigma.as_deref();
+    let uncertainty = sigma.map(|place| new(place, UNCERTAINTY)).transpose()?;
     let corrected = working("correcting", |step| {
         let sigma = uncertainty.as_ref().map(OutputFolder::path);
         let options = CorrectOptions { keep_code: arguments.keep_code, sigma };

@@ -141,7 +141,7 @@ fn filmed(
 
 /// Begins a recording within the demo's folder, replacing that of an earlier demo.
 fn own(folder: &Path) -> kinoise::Result<OutputFolder> {
-    OutputFolder::begin(folder, Leaves::Recording, &[], true)
+    OutputFolder::begin(folder, Leaves::RECORDING, &[], true)
 }
 
 /// Diagnoses what the calibrated model leaves out of the film; also returns the page.

@@ -51,6 +51,9 @@ pub const EVALUATION: Leaves =
 
 pub const METRICS: Leaves = results!("metrics.json", "report.html");
 
+/// Of `correct --sigma`: folders like the recording's.
+pub const UNCERTAINTY: Leaves = Leaves::Images { marks: &["sigma.json"] };
+
 pub const SIGMA: Leaves = results!("sigma.txt", "sigma", "sigma.json");
 
 /// Manual pages: one for the program and one per command.

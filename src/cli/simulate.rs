@@ -1,10 +1,10 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{bail, ensure};
 use clap::{Args, ValueEnum};
 use kinoise::effects::Active;
-use kinoise::io::{Leaves, OutputFolder, open, write_json};
+use kinoise::io::{Leaves, OutputFolder, open, settled, write_json};
 use kinoise::model::{Direction, Domain, PAPER_EQ1};
 use kinoise::simulate::room::{Film, Room};
 use kinoise::simulate::speckle::Causes;
@@ -80,7 +80,7 @@ impl Arguments {
     fn folder(&self, global: &Global) -> kinoise::Result<OutputFolder> {
         let read = [&self.model, &self.like].into_iter().flatten();
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).collect();
-        begin(&self.output, Leaves::Recording, &inputs, global)
+        begin(&self.output, Leaves::RECORDING, &inputs, global)
     }
 }
 
@@ -99,16 +99,17 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     Active::refuse_twice(&effects)?;
     let physics = physics(arguments, sigma, effects)?;
     let (made, recipe) = if arguments.room.room {
-        // A model brings its own sensor; the default is the camera that TUM readers assume.
+        // The default is the camera that TUM readers assume.
         let tum = || Film::kinect(arguments.shrink.unwrap_or(1));
-        let sensor = if arguments.model.is_some() { sensor } else { tum() };
+        let sensor = sensor.unwrap_or_else(tum);
         let room = Room::office(global.seed());
         let poses = arguments.room.path(&room, arguments.frames)?;
         refuse_of_target(&physics)?;
         let film = Film { sensor, room, poses, physics, seed: global.seed() };
         write_film(&film, arguments.folder(global)?)?
     } else {
-        shoot(arguments, sensor, physics, global)?
+        let kinect = || kinect_v1(arguments.shrink.unwrap_or(1));
+        shoot(arguments, sensor.unwrap_or_else(kinect), physics, global)?
     };
     if let Some(path) = &arguments.recipe {
         write_json(path, &recipe, "report this as a bug")?;
@@ -230,16 +231,15 @@ fn physics(
     Ok(Physics::Speckle { causes })
 }
 
-/// The model's own sensor, sigma and effects, or a Kinect and Eq. 1. Refuses effects `given` beside a model
+/// The model's own sensor, where it has one, its sigma, or Eq. 1, and its effects. Refuses effects `given` beside a model
 /// that has a shape of them already: they would count twice.
 fn sensor_and_noise(
     model: Option<&Path>,
     shrink: Option<usize>,
     given: &[Active],
-) -> anyhow::Result<(Sensor, SigmaModel, Vec<Active>)> {
-    let factor = shrink.unwrap_or(1);
+) -> anyhow::Result<(Option<Sensor>, SigmaModel, Vec<Active>)> {
     let Some(path) = model else {
-        return Ok((kinect_v1(factor), eq1_everywhere(), Vec::new()));
+        return Ok((None, eq1_everywhere(), Vec::new()));
     };
     let model = NoiseModel::read(path)?;
     detail_model(&model, Some(path));
@@ -248,14 +248,14 @@ fn sensor_and_noise(
         Some(_) if shrink.is_some() => {
             bail!("--shrink: {file} brings its own sensor; leave --shrink out")
         }
-        Some(own) => own.sensor().map_err(|e| anyhow::anyhow!("{file}: sensor: {e}"))?,
-        None => kinect_v1(factor),
+        Some(own) => Some(own.sensor().map_err(|e| anyhow::anyhow!("{file}: sensor: {e}"))?),
+        None => None,
     };
     if model.sigma.direction == Direction::Perpendicular {
         let across = "describes distances across the plane; depth noise is 1/cos(tilt) times them";
         say(format!("note: {file} {across}"));
     }
-    let effects = Active::all_of_model(&model.effects).with_context(|| file.to_string())?;
+    let effects = Active::all_of_model(&model.effects)?;
     let shaped = |id: &str| model.effects.iter().any(|e| e.id == id && !e.shape.is_empty());
     if let Some(id) = given.iter().map(|a| a.effect.card().id).find(|id| shaped(id)) {
         let remedy = "take it out of the model, or leave --effect out";
@@ -293,7 +293,7 @@ fn check_recipe(path: &Path, output: &Path) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let fault = if path.exists() {
         "the file exists; name a new one"
-    } else if path.starts_with(output) {
+    } else if settled(path)?.starts_with(settled(output)?) {
         "inside the recording it would give the answer away; put it elsewhere"
     } else if folder.is_some_and(|f| !f.is_dir()) {
         "its folder does not exist; make it first"

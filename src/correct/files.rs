@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::io::{is_description, write_atomic_with};
+use crate::io::{DESCRIPTIONS, write_atomic_with};
 use crate::read::{MAX_IMAGE, MAX_TEXT, open};
 
 /// Deepest nesting of folders; deeper nesting means a link that leads back into the recording.
@@ -74,7 +74,7 @@ fn refuse_outside(file: &Path, root: &Path) -> Result<()> {
 
 /// Whether a folder is no recording without this file, which is therefore written last.
 pub(super) fn makes_a_recording(file: &Path) -> bool {
-    is_description(file.file_name().and_then(|n| n.to_str()).unwrap_or_default())
+    file.file_name().and_then(|n| n.to_str()).is_some_and(|name| DESCRIPTIONS.contains(&name))
 }
 
 /// Copies files in the given order.

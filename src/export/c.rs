@@ -105,6 +105,7 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
         ("raw_offset", offset),
         ("raw_slope", slope),
         ("invalid", f64::from(invalid)),
+        ("raw_end", f64::from(sensor.code.end())),
     ];
     let mut text = String::from("\n");
     for (name, count) in counts {

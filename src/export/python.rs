@@ -96,6 +96,7 @@ fn constants(sensor: &Sensor, correction: &Correction) -> String {
         ("units_per_metre", units),
         ("raw_disparity", raw),
         ("invalid", invalid.to_string()),
+        ("raw_end", sensor.code.end().to_string()),
         ("scale", number(correction.scale)),
         ("drifts", format!("[{}]", drifts.join(", "))),
         ("ray_share", number(correction.ray_share)),

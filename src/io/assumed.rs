@@ -96,7 +96,7 @@ impl Assumed {
     }
 
     /// Fails if a topic is chosen where there are none.
-    pub(super) fn refuse_topic(&self, root: &Path) -> Result<()> {
+    pub(crate) fn refuse_topic(&self, root: &Path) -> Result<()> {
         match &self.topic {
             Some(topic) => Err(Error::Argument {
                 what: format!("--topic {topic}: {} is a folder of images", root.display()),
@@ -228,11 +228,16 @@ impl Assumed {
             intrinsics_uncertainty: None,
             kind: self.preset.map(|p| p.kind),
         };
-        match sensor.fault() {
-            Some(what) => Err(Error::Argument {
+        if let Some(what) = sensor.camera.fault() {
+            return Err(Error::Argument {
                 what: format!("--intrinsics {}: {what}", intrinsics.map(shortest).join(",")),
                 remedy: "give fx,fy,cx,cy in pixels",
-            }),
+            });
+        }
+        match sensor.fault() {
+            Some(what) => {
+                Err(Error::Argument { what, remedy: "correct the option, or what the recording says" })
+            }
             None => Ok(sensor),
         }
     }

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use super::assumed::Assumed;
 use super::images::size_of;
 use super::layout::{DEPTH_LIST, DESCRIPTION, UnknownKeys, is_view, read_sensor};
-use super::list::{read_list, shorten};
+use super::list::{FrameList, put_in_order, read_list, shorten};
 use super::output::{entries, listed};
+use super::output_folder::DESCRIPTIONS;
 use super::stills::{Film, Footage};
 use crate::error::{Error, Result};
 use crate::read::{is_there, read_text};
@@ -128,12 +129,13 @@ pub(crate) fn nothing_in(root: &Path) -> Result<Error> {
 }
 
 /// Sets of files that only the results of one command contain.
-const RESULTS: [(&[&str], &str); 6] = [
+const RESULTS: [(&[&str], &str); 7] = [
     (&["diagnosis.json", "report.html"], "diagnose"),
     (&["sigma.svg", "report.html"], "calibrate"),
     (&["trajectory.txt", "map.ply"], "map"),
     (&["tables.json", "report.html"], "compare"),
     (&["evaluation.json", "report.html"], "evaluate"),
+    (&["sigma.json", "sigma.txt"], "sigma"),
     (&["sigma.json"], "correct --sigma"),
 ];
 
@@ -146,8 +148,7 @@ pub(crate) fn results_in(root: &Path) -> Option<Error> {
 }
 
 fn holds_recording(folder: &Path) -> bool {
-    let marks = [DESCRIPTION, DEPTH_LIST, INDEX];
-    marks.iter().any(|name| folder.join(name).is_file())
+    DESCRIPTIONS.iter().any(|name| folder.join(name).is_file())
         || entries(folder).is_ok_and(|files| files.iter().any(|p| is_image(p)))
 }
 
@@ -156,8 +157,7 @@ pub(crate) const INDEX: &str = "INDEX.txt";
 pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let index = root.join(INDEX);
     let text = read_text(&index)?;
-    let mut remarks = Vec::new();
-    let mut frames = Vec::new();
+    let mut list = FrameList::default();
     for (i, line) in text.lines().enumerate() {
         let name = line.trim();
         if !name.starts_with("d-") {
@@ -169,13 +169,16 @@ pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> 
         })?;
         let path = root.join(name);
         if path.is_file() {
-            frames.push(FrameRef::file(timestamp, path));
+            list.frames.push(FrameRef::file(timestamp, path));
         } else {
             let odd = if path.exists() { "is not a regular file" } else { "is missing" };
             let name = shorten(name);
-            remarks.push(format!("INDEX.txt line {} names {name}, which {odd}; left out", i + 1));
+            let what = format!("INDEX.txt line {} names {name}, which {odd}; left out", i + 1);
+            list.remarks.push(what);
         }
     }
+    put_in_order(&mut list, INDEX);
+    let FrameList { frames, mut remarks } = list;
     let first = frames.first().ok_or_else(|| {
         Error::recording(
             &index,

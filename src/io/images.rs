@@ -10,7 +10,7 @@ use crate::camera::usable_size;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::read::{open, read_depth_image, read_image};
-use crate::view::FrameRef;
+use crate::view::{FrameRef, Within};
 
 /// Reads frames of one fixed size and hashes all the bytes it reads.
 #[derive(Debug, Clone)]
@@ -35,14 +35,14 @@ impl FrameSource {
         let image = within.store.frame(within.index)?;
         let words: Vec<u8> = image.raw.iter().flat_map(|w| w.to_le_bytes()).collect();
         self.hash.update(&words);
-        sized(&frame.path, image, self.width, self.height)
+        sized(&frame.path, Some(within), image, [self.width, self.height])
     }
 
     /// Reads one image file. Fails as [`FrameSource::frame`] does.
     pub fn read(&mut self, path: &Path) -> Result<Frame> {
         let bytes = read_depth_image(path, [self.width, self.height])?;
         self.hash.update(&bytes);
-        sized(path, decode(path, &bytes)?, self.width, self.height)
+        sized(path, None, decode(path, &bytes)?, [self.width, self.height])
     }
 
     /// SHA-256 of all bytes read so far, in the order they were read.
@@ -54,24 +54,28 @@ impl FrameSource {
 /// Reads one depth frame of this size, px, without hashing.
 pub(crate) fn read_depth(frame: &FrameRef, width: usize, height: usize) -> Result<Frame> {
     if frame.within.is_some() {
-        return sized(&frame.path, read_any(frame)?, width, height);
+        return sized(&frame.path, frame.within.as_ref(), read_any(frame)?, [width, height]);
     }
     let bytes = read_depth_image(&frame.path, [width, height])?;
-    sized(&frame.path, decode(&frame.path, &bytes)?, width, height)
+    sized(&frame.path, None, decode(&frame.path, &bytes)?, [width, height])
 }
 
-fn sized(path: &Path, frame: Frame, width: usize, height: usize) -> Result<Frame> {
-    if (frame.width, frame.height) != (width, height) {
-        return Err(Error::image(
-            path,
-            format!(
-                "the image is {} x {} px, the recording says {width} x {height}",
-                frame.width, frame.height
-            ),
-            "correct width and height in recording.json, or take the image out",
-        ));
+fn sized(
+    path: &Path,
+    within: Option<&Within>,
+    frame: Frame,
+    [width, height]: [usize; 2],
+) -> Result<Frame> {
+    let Frame { width: w, height: h, .. } = frame;
+    if [w, h] == [width, height] {
+        return Ok(frame);
     }
-    Ok(frame)
+    let place = within.map_or_else(String::new, |w| format!("{}: ", w.store.place(w.index)));
+    Err(Error::image(
+        path,
+        format!("{place}the image is {w} x {h} px, the recording's are {width} x {height}"),
+        "take the image out, or correct width and height in recording.json",
+    ))
 }
 
 /// Width and height of a frame.

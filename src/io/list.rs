@@ -8,7 +8,7 @@ use crate::units::{counted, verb};
 use crate::view::FrameRef;
 
 /// Timestamps from here on are not times, s: thirty thousand years.
-const LATEST_S: f64 = 1e12;
+pub(super) const LATEST_S: f64 = 1e12;
 
 /// The frames that a list names, in time order, and remarks on it.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -59,7 +59,7 @@ fn parse(line: &str) -> Option<(f64, &str)> {
     (!path.is_empty()).then_some((timestamp, path))
 }
 
-fn put_in_order(list: &mut FrameList, file: &str) {
+pub(super) fn put_in_order(list: &mut FrameList, file: &str) {
     let frames = &mut list.frames;
     if frames.windows(2).any(|w| w[1].timestamp < w[0].timestamp) {
         list.remarks.push(format!("{file}: timestamps were out of order; frames were sorted"));

@@ -23,12 +23,13 @@ pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
 pub(crate) use output::{entries, sync_folder, write_atomic_with};
 pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
-pub(crate) use output_folder::is_description;
-pub use output_folder::{Leaves, OutputFolder, refuse_inside, refuse_nested};
+pub(crate) use output_folder::DESCRIPTIONS;
+pub use output_folder::{Leaves, OutputFolder, refuse_inside, refuse_nested, settled};
 pub use pictures::{ColourImage, InfraredImage};
 pub(crate) use unfinished::lock;
 pub use unfinished::{Interrupted, discard_stale, discard_unfinished};
 
+use std::fs::File;
 use std::path::Path;
 
 use raw_values::RawValues;
@@ -63,6 +64,9 @@ impl Layout {
     pub fn of(path: &Path) -> Result<Self> {
         if container::is_one(path) {
             return Ok(Layout::Container);
+        }
+        if path.is_file() {
+            File::open(path).map_err(|e| Error::read(path, e))?;
         }
         if !path.is_dir() {
             let what = match path.exists() {
@@ -121,7 +125,12 @@ fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> 
         return Err(Error::recording(
             path,
             reason.unwrap_or_else(|| "no view in it".into()),
-            "a view is a folder with depth.txt and depth/*.png beside recording.json",
+            match layout {
+                Layout::Recording => {
+                    "a view is a folder with depth.txt and depth/*.png beside recording.json"
+                }
+                _ => "give depth images that can be read and hold depths",
+            },
         ));
     }
     let frames: Vec<&FrameRef> = recording.views.iter().flat_map(|v| &v.depth).collect();

@@ -30,9 +30,17 @@ pub enum Leaves {
         /// Names that no other command writes; without one of them the other files count as foreign.
         marks: &'static [&'static str],
     },
-    /// A recording or a sequence: everything in the folder belongs to it.
-    Recording,
+    /// Images: everything in a folder that holds one of these files belongs to them.
+    Images { marks: &'static [&'static str] },
 }
+
+impl Leaves {
+    /// A recording or a sequence.
+    pub const RECORDING: Leaves = Leaves::Images { marks: &DESCRIPTIONS };
+}
+
+/// Files that make a folder a recording.
+pub(crate) const DESCRIPTIONS: [&str; 3] = [DESCRIPTION, INDEX, DEPTH_LIST];
 
 /// An output folder in preparation; discarded if dropped before [`OutputFolder::finish`].
 #[derive(Debug)]
@@ -190,7 +198,7 @@ impl OutputFolder {
     /// Whether new results remove this name from the place.
     fn is_replaced(&self, name: &OsString, comes: bool) -> bool {
         match (self.leaves, self.stands) {
-            (Leaves::Recording, _) => true,
+            (Leaves::Images { .. }, _) => true,
             (_, Stands::Earlier) if !self.place.join(name).is_dir() => true,
             _ => self.place.join(name).is_dir() && comes,
         }
@@ -198,10 +206,8 @@ impl OutputFolder {
 
     fn comes_last(&self, name: &OsString) -> bool {
         let name = name.to_string_lossy();
-        match self.leaves {
-            Leaves::Recording => is_description(&name),
-            Leaves::Results { marks, .. } => marks.contains(&&*name),
-        }
+        let (Leaves::Images { marks } | Leaves::Results { marks, .. }) = self.leaves;
+        marks.contains(&&*name)
     }
 }
 
@@ -239,11 +245,6 @@ fn is_unfinished(name: &OsString) -> bool {
     name.to_string_lossy().starts_with(UNFINISHED)
 }
 
-/// Whether this file makes a folder a recording; such files are written last.
-pub(crate) fn is_description(name: &str) -> bool {
-    [DESCRIPTION, INDEX, DEPTH_LIST].contains(&name)
-}
-
 /// Creates the missing folders and returns them, innermost first.
 fn make_parents(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let missing = folder.ancestors().take_while(|f| !f.exists()).map(Path::to_path_buf).collect();
@@ -277,13 +278,13 @@ fn what_stands(place: &Path, leaves: Leaves, force: bool) -> Result<Stands> {
     }
     let refuse = |what: String, remedy| Err(Error::recording(place, what, remedy));
     match leaves {
-        Leaves::Recording if !there.iter().any(|name| is_description(name)) => refuse(
+        Leaves::Images { marks } if !there.iter().any(|name| marks.contains(&&**name)) => refuse(
             format!("the folder is not empty (it holds {})", listed(&there)),
-            "choose a new folder for the recording",
+            "choose a new folder",
         ),
-        Leaves::Recording if force => Ok(Stands::Earlier),
-        Leaves::Recording => refuse(
-            "the folder is not empty: it holds a recording".into(),
+        Leaves::Images { .. } if force => Ok(Stands::Earlier),
+        Leaves::Images { .. } => refuse(
+            "the folder is not empty: it holds an earlier output".into(),
             "choose a new folder, or give --force to replace what is there",
         ),
         Leaves::Results { names, marks } => {
@@ -317,7 +318,7 @@ fn refuse_replacing(place: &Path, leaves: Leaves, input: &Path) -> Result<()> {
     let Ok(within) = input.strip_prefix(&place_is) else { return Ok(()) };
     let first = within.iter().next().unwrap_or_default().to_string_lossy();
     let replaced = match leaves {
-        Leaves::Recording => true,
+        Leaves::Images { .. } => true,
         Leaves::Results { names, .. } => names.iter().any(|names| is_one_of(names, &first)),
     };
     if replaced {
@@ -348,7 +349,7 @@ pub fn refuse_nested(one: &Path, other: &Path) -> Result<()> {
 }
 
 /// Absolute path without links. A path that does not exist yet has no canonical form; an ancestor has.
-fn settled(place: &Path) -> Result<PathBuf> {
+pub fn settled(place: &Path) -> Result<PathBuf> {
     let absolute = std::path::absolute(place).map_err(|e| Error::write(place, e))?;
     for folder in absolute.ancestors() {
         if let Ok(standing) = folder.canonicalize() {

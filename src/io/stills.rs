@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::images::FrameSource;
+use super::images::read_depth;
+use crate::camera::Camera;
 use crate::frame::{DepthTable, Frame};
 use crate::units::verb;
 use crate::view::{FrameRef, Recording, Sensor, View, ViewNotes};
@@ -124,12 +125,11 @@ fn cut_up(frames: Vec<FrameRef>, film: Film, sensor: &Sensor) -> (Vec<View>, Vec
 /// Runs of frames that agree with their first frame, and why each other frame was rejected.
 fn stretches(frames: Vec<FrameRef>, sensor: &Sensor) -> (Vec<Vec<FrameRef>>, Vec<String>) {
     let table = sensor.code.table();
-    let mut source = FrameSource::new(sensor.camera.width, sensor.camera.height);
     let mut stretches: Vec<Vec<FrameRef>> = Vec::new();
     let mut reference = Vec::new();
     let mut blank = Vec::new();
     for frame in frames {
-        match samples(&mut source, &frame, &table) {
+        match samples(&frame, &sensor.camera, &table) {
             Ok(samples) => match stretches.last_mut() {
                 Some(stretch) if still(&reference, &samples) => stretch.push(frame),
                 _ => {
@@ -144,12 +144,8 @@ fn stretches(frames: Vec<FrameRef>, sensor: &Sensor) -> (Vec<Vec<FrameRef>>, Vec
 }
 
 /// Depths on the grid, or why the frame has none.
-fn samples(
-    source: &mut FrameSource,
-    frame: &FrameRef,
-    table: &DepthTable,
-) -> Result<Vec<f32>, String> {
-    let image = source.frame(frame).map_err(|e| e.to_string())?;
+fn samples(frame: &FrameRef, camera: &Camera, table: &DepthTable) -> Result<Vec<f32>, String> {
+    let image = read_depth(frame, camera.width, camera.height).map_err(|e| e.to_string())?;
     let samples = sample(&image, table);
     if samples.iter().all(|z| z.is_nan()) {
         return Err(format!("{}: no pixel carries a depth", frame.place()));

@@ -27,18 +27,19 @@ pub(super) fn is_one(root: &Path) -> bool {
 }
 
 /// Name (frame-XXXXXX) and number of a depth image.
-fn stem(path: &Path) -> Option<(String, f64)> {
+fn stem(path: &Path) -> Option<(String, u32)> {
     let name = path.file_name()?.to_str()?.strip_suffix(DEPTH)?;
-    let number: f64 = name.strip_prefix("frame-")?.parse().ok()?;
+    let number = name.strip_prefix("frame-")?.parse().ok()?;
     Some((name.to_string(), number))
 }
 
 pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
+    assumed.refuse_topic(root)?;
     let mut remarks = vec!["7-Scenes has no stamps: frame number / 30 Hz is taken".to_string()];
     let (mut moments, mut truth) = (Vec::new(), Vec::new());
     for path in entries(root)? {
         let Some((name, number)) = stem(&path) else { continue };
-        let stamp = number / RATE_HZ;
+        let stamp = f64::from(number) / RATE_HZ;
         let colour = ["color.png", "color.jpg"].map(|kind| root.join(format!("{name}.{kind}")));
         let colour = first_there(colour)?.map(|p| FrameRef::file(stamp, p));
         let pose = root.join(format!("{name}.pose.txt"));

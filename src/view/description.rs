@@ -73,6 +73,9 @@ impl RecordingFile {
                 DepthCode::Metric { units_per_metre, invalid: self.invalid.unwrap_or(0) }
             }
             (None, Some(RawDisparity { offset, slope, invalid })) => {
+                if self.invalid.is_some() {
+                    return Err("invalid of raw disparities stands within raw_disparity".into());
+                }
                 DepthCode::Disparity { offset, slope, invalid }
             }
             (None, None) => return Err("neither units_per_metre nor raw_disparity is given".into()),

@@ -60,13 +60,11 @@ impl DropoutOutcome {
 
 /// Fewest views that can show a rule.
 const MIN_VIEWS: usize = 4;
-/// False-alarm probability of steps and curves on a clean recording.
+/// False-alarm probability of steps and curves on a clean recording, and of the shadow.
 pub const LEVEL: f64 = 0.003;
 /// Tests that share [`LEVEL`]: constant steps and curves, steps that begin mid-session, and the foot of a
 /// rise.
 const TESTS: f64 = 3.0;
-/// The same for the shadow.
-const SHADOW_LEVEL: f64 = 0.0005;
 const MAX_FINDINGS: usize = 3;
 /// Least gain of a later finding, as a share of the first finding's.
 const MIN_OF_FIRST: f64 = 0.1;
@@ -100,7 +98,7 @@ pub fn missing(
     let sides: Vec<Sides> = (0..fields.len())
         .map(|v| Sides::of(&fields[v].edges, twins.map(|(t, _)| &t[v].edges)))
         .collect();
-    if let Some(band) = band(&sides, SHADOW_LEVEL) {
+    if let Some(band) = band(&sides, LEVEL) {
         let mut shadow = shadow_finding(band, fields);
         let of_all = shadow.of_some.is_none();
         shadow.replicated = of_all.then(|| bands_agree(&sides, &seen.second)).flatten();

@@ -286,9 +286,9 @@ static inline int kinoise_sigma_image(const float *depth_m, double *sigma_m, con
 static inline double kinoise_stored(double z)
 {
     double exact = KINOISE_RAW_DISPARITY ? (1.0 / z - kinoise_raw_offset) / kinoise_raw_slope : z * kinoise_units_per_metre;
-    double raw = floor(exact + 0.5), top = KINOISE_RAW_DISPARITY ? 2047.0 : 65535.0;
+    double raw = floor(exact + 0.5);
     double back = KINOISE_RAW_DISPARITY ? 1.0 / (kinoise_raw_offset + kinoise_raw_slope * raw) : raw / kinoise_units_per_metre;
-    int good = z > 0.0 && raw > 0.0 && raw < top && raw != kinoise_invalid && back > 0.0 && back < 100.0;
+    int good = z > 0.0 && raw > 0.0 && raw < kinoise_raw_end && raw != kinoise_invalid && back > 0.0 && back < 100.0;
     return good ? back : NAN;
 }
 

@@ -214,15 +214,15 @@ def _stored(z):
     """Through the raw value: rounded, and NaN where none stands for it."""
     with np.errstate(all="ignore"):
         if _raw_disparity is not None:
-            exact, top = (1.0 / z - _raw_disparity[0]) / _raw_disparity[1], 2047.0
+            exact = (1.0 / z - _raw_disparity[0]) / _raw_disparity[1]
         else:
-            exact, top = z * _units_per_metre, 65535.0
+            exact = z * _units_per_metre
         raw = np.floor(exact + 0.5)
         if _raw_disparity is not None:
             back = 1.0 / (_raw_disparity[0] + _raw_disparity[1] * raw)
         else:
             back = raw / _units_per_metre
-        good = (z > 0.0) & (raw > 0.0) & (raw < top) & (raw != _invalid) & (back > 0.0) & (back < 100.0)
+        good = (z > 0.0) & (raw > 0.0) & (raw < _raw_end) & (raw != _invalid) & (back > 0.0) & (back < 100.0)
     return np.where(good, back, np.nan)
 
 

@@ -208,7 +208,10 @@ fn sensor(
         None => given.sensor(&name, survey.size, [0.0; 4], code)?,
     };
     sensor.serial = device.serial;
-    Ok(sensor)
+    match sensor.fault() {
+        Some(fault) => Err(Error::recording(bag.path(), fault, "record the bag again")),
+        None => Ok(sensor),
+    }
 }
 
 fn code(

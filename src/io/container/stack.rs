@@ -12,11 +12,12 @@ use super::npy::{Header, MAX_HEADER};
 use super::npz::{Body, Member, members};
 use super::pixels::Pixels;
 use super::scale::{Scale, words};
-use crate::camera::usable_size;
+use crate::camera::{Camera, usable_size};
 use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame};
 use crate::io::assumed::Assumed;
 use crate::io::folder::NOMINAL_INTERVAL_S;
+use crate::io::list::LATEST_S;
 use crate::io::stills::{Film, Footage};
 use crate::view::{FrameRef, FrameStore, Sensor, Within};
 
@@ -91,23 +92,34 @@ pub fn open_npy(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
 }
 
 pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
-    let members = members(path)?;
-    let arrays: Result<Vec<Array>> = members.iter().map(|m| Array::open(path, Some(m))).collect();
-    let mut arrays = arrays?;
+    let is_used =
+        |name: &str| BESIDE.contains(&name) || assumed.topic.as_deref().is_some_and(|t| t == name);
+    let (mut arrays, mut unread) = (Vec::new(), None);
+    for member in &members(path)? {
+        match Array::open(path, Some(member)) {
+            Ok(array) => arrays.push(array),
+            Err(e) if is_used(&member.name) => return Err(e),
+            // Of a kind that no depth image has.
+            Err(e) => unread = unread.or(Some(e)),
+        }
+    }
     let stacks: Vec<usize> =
         (0..arrays.len()).filter(|&i| arrays[i].header.shape.len() > 2).collect();
     let names = |of: &[usize]| {
-        let names: Vec<&str> = of.iter().map(|&i| &*members[i].name).collect();
+        let names: Vec<&str> = of.iter().filter_map(|&i| arrays[i].name.as_deref()).collect();
         names.join(", ")
     };
     let all: Vec<usize> = (0..arrays.len()).collect();
     let chosen = match (&assumed.topic, &stacks[..]) {
-        (Some(topic), _) => members.iter().position(|m| m.name == *topic).ok_or_else(|| {
+        (Some(topic), _) => arrays.iter().position(|a| a.name == Some(topic.clone())).ok_or_else(|| {
             let what = format!("there is no array {topic}; these are: {}", names(&all));
             Error::recording(path, what, "give one of them to --topic")
         })?,
         (None, [only]) => *only,
         (None, []) => {
+            if let Some(unread) = unread {
+                return Err(unread);
+            }
             let what = format!("no array is a stack of images; these are: {}", names(&all));
             return Err(Error::recording(path, what, REMEDY));
         }
@@ -120,6 +132,10 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let beside = Beside::of(&arrays)?;
     film(depth, beside, assumed)
 }
+
+/// Names of the arrays that are read beside the images.
+const BESIDE: [&str; 7] =
+    ["K", "intrinsics", "D", "distortion", "units_per_metre", "timestamps", "stamps"];
 
 /// What an archive contains besides its images.
 #[derive(Default)]
@@ -218,9 +234,25 @@ fn film(array: Array, beside: Beside, assumed: &Assumed) -> Result<(Footage, Sen
     }
     let path = array.path.clone();
     let stamps = beside.stamps;
-    if stamps.as_ref().is_some_and(|s| s.len() != count || !s.is_sorted_by(|a, b| a <= b)) {
-        let what = format!("its {count} images do not have as many timestamps, in order");
+    let are_times = |s: &Vec<f64>| {
+        let times = s.iter().all(|t| t.abs() < LATEST_S);
+        s.len() == count && times && s.is_sorted_by(|a, b| a <= b)
+    };
+    if !stamps.as_ref().is_none_or(are_times) {
+        let what = format!("its {count} images do not have as many timestamps in seconds, in order");
         return Err(array.wrong(what, "save one a frame, in seconds"));
+    }
+    if let (None, Some([fx, fy, cx, cy])) = (assumed.intrinsics, beside.intrinsics) {
+        let camera = Camera { width, height, fx, fy, cx, cy, distortion: None };
+        if let Some(fault) = camera.fault() {
+            return Err(Error::recording(&path, format!("its intrinsics: {fault}"), REMEDY_K));
+        }
+    }
+    if let (None, Some(units_per_metre)) = (assumed.code, beside.units_per_metre) {
+        if let Some(fault) = (DepthCode::Metric { units_per_metre, invalid: 0 }).fault() {
+            const REMEDY: &str = "correct it, or leave it out and give --units-per-metre";
+            return Err(Error::recording(&path, fault, REMEDY));
+        }
     }
     let given = Assumed {
         intrinsics: assumed.intrinsics.or(beside.intrinsics),

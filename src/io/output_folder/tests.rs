@@ -75,7 +75,7 @@ fn what_others_wrote_stays_unless_forced_and_then_but_for_the_names() {
 #[test]
 fn a_recording_is_replaced_by_force_alone_and_nothing_else_is() {
     let dir = tempfile::tempdir().unwrap();
-    let begin = |force| OutputFolder::begin(dir.path(), Leaves::Recording, &[], force);
+    let begin = |force| OutputFolder::begin(dir.path(), Leaves::RECORDING, &[], force);
     put(dir.path(), &["thesis.tex"]);
     for force in [false, true] {
         assert!(begin(force).unwrap_err().to_string().contains("not empty"), "{force}");
@@ -108,7 +108,7 @@ fn nothing_goes_into_an_input() {
         if cfg!(not(unix)) && place.starts_with("link") {
             continue;
         }
-        for leaves in [TABLES, Leaves::Recording] {
+        for leaves in [TABLES, Leaves::RECORDING] {
             let error = refused(place, leaves, &input).expect(place);
             assert!(error.contains("inside the recording"), "{place}: {error}");
         }
