@@ -110,7 +110,7 @@ pub fn model_of(
     let (fit, comparison) = fit_chosen(&table, options.form)?;
     let warnings = warnings_of(recording, measurements, &fit);
     let mut provenance = options.provenance(Some(options.measure.seed.0));
-    provenance.options = describe(options, fit.form);
+    provenance.options = describe(options, fit.form, !comparison.is_empty());
     provenance.sha256 = hashes(recording, measurements)?;
     let mut model = noise_model(
         Some(RecordingFile::of(&recording.sensor)),
@@ -204,14 +204,19 @@ fn noise_model(
     }
 }
 
-fn describe(options: &CalibrateOptions, form: Form) -> Map<String, Value> {
+fn describe(options: &CalibrateOptions, form: Form, compared: bool) -> Map<String, Value> {
+    let chosen_by = match options.form {
+        Some(_) => "user",
+        None if compared => "held-out distances",
+        None => "default: too few distances to compare forms",
+    };
     let planes = match options.measure.planes {
         Planes::PerView => "view",
         Planes::PerFrame => "frame",
     };
     let value = json!({
         "form": form.id(),
-        "form_chosen_by": if options.form.is_some() { "user" } else { "held-out distances" },
+        "form_chosen_by": chosen_by,
         "sigma": options.kind.description(),
         "planes": planes,
         "ransac_threshold_m": options.measure.ransac_threshold_m,

@@ -73,15 +73,20 @@ impl DepthCode {
 
     /// The raw value nearest to the depth `z` (m), or the one for "no measurement" when none fits.
     pub fn raw(&self, z: f64) -> u16 {
-        let (exact, invalid) = match *self {
-            DepthCode::Metric { units_per_metre, invalid } => (z * units_per_metre, invalid),
-            DepthCode::Disparity { offset, slope, invalid } => {
-                ((1.0 / z - offset) / slope, invalid)
-            }
+        let exact = match *self {
+            DepthCode::Metric { units_per_metre, .. } => z * units_per_metre,
+            DepthCode::Disparity { offset, slope, .. } => (1.0 / z - offset) / slope,
         };
         let rounded = exact.round();
         let stored = z > 0.0 && rounded > 0.0 && rounded < f64::from(self.end());
-        if stored { rounded as u16 } else { invalid }
+        if stored { rounded as u16 } else { self.invalid() }
+    }
+
+    /// The raw value for "no measurement".
+    pub fn invalid(&self) -> u16 {
+        match *self {
+            DepthCode::Metric { invalid, .. } | DepthCode::Disparity { invalid, .. } => invalid,
+        }
     }
 
     /// First raw value past those that a depth is stored as.

@@ -41,6 +41,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let written =
         working("predicting", |step| sigma_images(&sequence, &model, output.path(), step))?;
     output.finish()?;
+    notes(&written.remarks);
     let share = written.beyond as f64 / written.measured.max(1) as f64;
     if written.beyond > 0 {
         let [near, far] = model.sigma.domain.z_m;

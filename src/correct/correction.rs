@@ -8,7 +8,7 @@ use crate::effects::{Active, Inverse};
 use crate::error::Result;
 use crate::model::{self, NoiseModel, SigmaModel};
 use crate::sensors::KINECT_BASELINE_M;
-use crate::terms::{Needs, Pixels, Statistic, Term};
+use crate::terms::{ANYWHERE, LearntTerm, Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
 
 /// Conditions of a frame.
@@ -28,9 +28,6 @@ impl Conditions {
         self.temperature_c.is_some() || !term.needs().temperature
     }
 }
-
-/// A term of the model with the range of disparities at which it was learnt, px.
-pub(crate) type LearntTerm = (Term, [f64; 2]);
 
 /// The biases of a sensor, prepared for removal from its depth images.
 #[derive(Debug, Clone)]
@@ -65,9 +62,6 @@ pub struct Correction {
     unpredicted: Vec<String>,
     remarks: Vec<String>,
 }
-
-/// Range of a term that does not state where it was learnt.
-const ANYWHERE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Warm-up: depth drifts by `relative` with a time constant.
 #[derive(Debug, Clone, Copy)]
@@ -145,6 +139,19 @@ impl Correction {
         let ranges = self.terms.iter().filter(grows).map(|(_, learnt)| *learnt);
         let both = ranges.reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
         (both != ANYWHERE).then_some(both)
+    }
+
+    /// Remarks on this combination of model and sensor, and on what sigma lacks without a temperature.
+    pub(super) fn remarks_on_sigma(&self) -> Vec<String> {
+        let mut remarks = self.remarks.clone();
+        remarks.extend(self.unpredicted.iter().map(|id| format!("sigma lacks the model's {id}")));
+        let of_temperature = |(t, _): &LearntTerm| !Conditions::default().determine(t);
+        if self.variance.iter().any(of_temperature) {
+            remarks.push(
+                "sigma lacks what the model says of the temperature, which is unknown".into(),
+            );
+        }
+        remarks
     }
 
     /// Remarks on this combination of model and sensor.

@@ -3,13 +3,12 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::correction::{Conditions, Correction, LearntTerm};
+use super::correction::{Conditions, Correction};
 use super::slopes::Slopes;
-use super::uncertainty::where_held;
 use crate::error::{Error, Result};
 use crate::measure::ColumnSteps;
 use crate::plane::Plane;
-use crate::terms::{PixelContext, Pixels};
+use crate::terms::{LearntTerm, PixelContext, Pixels, ROOM_LUX};
 
 /// Change of the disparity at which the fixed-point iteration stops, px. Terms are evaluated at the corrected
 /// disparity. The remaining error is smaller by the slope of the terms, 0.01 for a few tenths of a px over
@@ -84,7 +83,7 @@ impl Correction {
         let mut d = measured;
         for _ in 0..MAX_ROUNDS {
             known.stand(&mut place, i, d);
-            let bias: f64 = known.terms.iter().map(|t| held(t, &place)).sum();
+            let bias: f64 = known.terms.iter().map(|(t, px)| t.held_value(*px, &place)).sum();
             let next = measured - bias;
             if !next.is_finite() {
                 return measured;
@@ -149,7 +148,7 @@ impl Correction {
             known.stand(&mut place, i, self.scale_px_m / depth);
             let plain = self.sigma.axial_sigma(depth, place.theta);
             place.variance = (plain * place.disparity / depth).powi(2);
-            let terms = variance().map(|t| held(t, &place));
+            let terms = variance().map(|(t, px)| t.held_value(*px, &place));
             plain * (0.5 * terms.sum::<f64>()).exp()
         };
         Ok(depth_m.par_iter().enumerate().map(sigma).collect())
@@ -186,12 +185,6 @@ impl Correction {
     }
 }
 
-/// Value of a term. A shape that is fixed in the image and scales with disparity is held at the ends of its
-/// learnt range.
-fn held((term, [low, high]): &LearntTerm, place: &PixelContext) -> f64 {
-    term.value(&where_held(&term.basis, [*low, *high], place))
-}
-
 /// Quantities shared by all pixels of one image.
 struct Known<'a> {
     conditions: &'a Conditions,
@@ -212,7 +205,7 @@ impl Known<'_> {
         let mut place = self.pixels.place(i);
         place.session_s = self.conditions.session_s;
         place.temperature_c = self.conditions.temperature_c.unwrap_or(0.0);
-        place.ambient = self.conditions.ambient_lux.unwrap_or(0.0);
+        place.ambient = self.conditions.ambient_lux.unwrap_or(ROOM_LUX);
         place
     }
 

@@ -18,7 +18,7 @@ mod sigma_images;
 mod slopes;
 mod uncertainty;
 
+pub(crate) use correction::Drift;
 pub use correction::{Conditions, Correction};
-pub(crate) use correction::{Drift, LearntTerm};
 pub use recording::{CorrectOptions, Corrected, SIGMA_UNITS_PER_METRE, correct_recording};
 pub use sigma_images::{SigmaImages, sigma_images};

@@ -17,7 +17,7 @@ use crate::model::NoiseModel;
 use crate::sequence::{Moment, Sequence};
 
 /// Statistics of the written images.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct SigmaImages {
     pub frames: usize,
     /// Pixels with a depth, in all frames.
@@ -28,6 +28,8 @@ pub struct SigmaImages {
     pub beyond: usize,
     /// Mean sigma of the measured pixels, m.
     pub mean_m: f64,
+    /// Where the model does not match the sequence's sensor, and what sigma lacks.
+    pub remarks: Vec<String>,
 }
 
 /// The largest value of an image.
@@ -88,6 +90,7 @@ pub fn sigma_images(
     write_json(&output.join("sigma.json"), &about, "report this as a bug")?;
     let mut sum = all.into_iter().fold(SigmaImages::default(), SigmaImages::and);
     sum.mean_m /= sum.measured.max(1) as f64;
+    sum.remarks = correction.remarks_on_sigma();
     Ok(sum)
 }
 
@@ -99,6 +102,7 @@ impl SigmaImages {
             clamped: self.clamped + other.clamped,
             beyond: self.beyond + other.beyond,
             mean_m: self.mean_m + other.mean_m,
+            remarks: Vec::new(),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::model;
-use crate::terms::{Basis, Modulation, Needs, PixelContext, Term};
+use crate::terms::{ANYWHERE, Basis, Modulation, Needs, PixelContext, Term};
 
 /// The covariance of the removed bias.
 #[derive(Debug, Clone, Default)]
@@ -67,8 +67,7 @@ impl Uncertainty {
             let coefficients = vec![0.0; 3];
             let term = Term::bias(Basis::Affine { times }, coefficients);
             let own = vec![error * error, 0.0, 0.0];
-            let anywhere = [0.0, f64::INFINITY];
-            self.shapes.push(Spread { term: (term, anywhere), parts: Vec::new(), own });
+            self.shapes.push(Spread { term: (term, ANYWHERE), parts: Vec::new(), own });
         }
     }
 
@@ -82,24 +81,11 @@ impl Uncertainty {
         parts.resize(self.parts.len(), 0.0);
         let mut own = 0.0;
         for Spread { term: (term, learnt), parts: mine, own: variances } in &self.shapes {
-            term.basis.visit(&where_held(&term.basis, *learnt, place), |j, g| {
+            term.basis.visit(&term.basis.held(*learnt, place), |j, g| {
                 mine.iter().for_each(|(part, coefficients)| parts[*part] += g * coefficients[j]);
                 own += variances.get(j).map_or(0.0, |variance| g * g * variance);
             });
         }
         own + parts.iter().map(|p| p * p).sum::<f64>()
     }
-}
-
-/// The place, with its disparity clamped to where a shape that scales with disparity was learnt.
-pub(super) fn where_held(
-    basis: &Basis,
-    [low, high]: [f64; 2],
-    place: &PixelContext,
-) -> PixelContext {
-    let inside = (low..=high).contains(&place.disparity);
-    if inside || basis.still_power().is_none() {
-        return *place;
-    }
-    PixelContext { disparity: place.disparity.clamp(low, high), ..*place }
 }

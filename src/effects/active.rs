@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::model;
 use crate::model::NoiseModel;
 use crate::rng::Seed;
+use crate::terms::ANYWHERE;
 use crate::units::{shortest, to_digits};
 
 /// An effect that is switched on.
@@ -155,7 +156,10 @@ impl Active {
     pub fn all_of_model(effects: &[model::Effect]) -> Result<Vec<Self>> {
         let formulas = effects.iter().filter(|e| e.shape.is_empty());
         let mut all: Vec<Active> = formulas.map(Active::from_model).collect::<Result<_>>()?;
-        let shapes = Shape::of(effects.iter().flat_map(|e| e.shape.iter().cloned()));
+        let shapes = Shape::of(effects.iter().flat_map(|e| {
+            let learnt = e.learnt_px.unwrap_or(ANYWHERE);
+            e.shape.iter().map(move |term| (term.clone(), learnt))
+        }));
         all.extend(shapes.map(|shape| Active {
             effect: Acting::Shape(Arc::new(shape)),
             settings: Settings(Vec::new()),

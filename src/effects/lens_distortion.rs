@@ -72,19 +72,24 @@ impl Effect for LensDistortion {
     }
 }
 
-/// The ray that a lens with `k1` images at (x, y), by fixed-point iteration.
+/// The ray that a lens with `k1` images at (x, y), by fixed-point iteration. NaN where there is none: a lens
+/// with k1 < 0 images no ray beyond 2 / (3 sqrt(-3 k1)).
 fn undistorted((xd, yd): (f64, f64), k1: f64) -> (f64, f64) {
+    let radial = |x: f64, y: f64| 1.0 + k1 * (x * x + y * y);
     let (mut x, mut y) = (xd, yd);
     for _ in 0..ITERATIONS {
-        let radial = 1.0 + k1 * (x * x + y * y);
+        let radial = radial(x, y);
         (x, y) = (xd / radial, yd / radial);
     }
-    (x, y)
+    let off = (x * radial(x, y) - xd).hypot(y * radial(x, y) - yd);
+    if off < MAX_OFF { (x, y) } else { (f64::NAN, f64::NAN) }
 }
 
 /// At a Kinect's corner (0.69) with |k1| = 0.2 each iteration at least halves the error: the remainder is
 /// below 1e-4 px.
 const ITERATIONS: usize = 20;
+/// Largest error of a ray, 0.06 px of a Kinect.
+const MAX_OFF: f64 = 1e-4;
 
 /// Like [`bent`], where a matcher looks through the lens: it finds the shift between two spots that are
 /// both displaced, and a larger shift is stretched more.

@@ -6,13 +6,15 @@ use super::{Card, Carded, Draw, Effect, Exposure, Kept, Settings, Stage};
 use crate::plane::Plane;
 use crate::scene::Seen;
 use crate::stats::median_in_place;
-use crate::terms::{Needs, PixelContext, Pixels, Statistic, Term, edge_distances};
+use crate::terms::{LearntTerm, Needs, PixelContext, Pixels, Statistic, Term, edge_distances};
 
 /// All terms of one statistic: a bias shifts the disparity, a variance term scales the variance, evaluated
 /// at what each pixel sees undisturbed.
 pub struct Shape {
     card: &'static Card,
     terms: Vec<Term>,
+    /// Disparities at which each was learnt, px.
+    learnt: Vec<[f64; 2]>,
 }
 
 static BIAS: Card = Card {
@@ -39,11 +41,13 @@ static VARIANCE: Card = Card {
 
 impl Shape {
     /// Groups terms into a shape of the bias and one of the variance.
-    pub(super) fn of(terms: impl Iterator<Item = Term>) -> impl Iterator<Item = Shape> {
-        let (bias, variance): (Vec<Term>, Vec<Term>) =
-            terms.partition(|t| t.statistic == Statistic::Bias);
-        let shapes =
-            [Shape { card: &BIAS, terms: bias }, Shape { card: &VARIANCE, terms: variance }];
+    pub(super) fn of(terms: impl Iterator<Item = LearntTerm>) -> impl Iterator<Item = Shape> {
+        let (bias, variance): (Vec<LearntTerm>, Vec<LearntTerm>) =
+            terms.partition(|(t, _)| t.statistic == Statistic::Bias);
+        let shapes = [(&BIAS, bias), (&VARIANCE, variance)].map(|(card, terms)| {
+            let (terms, learnt) = terms.into_iter().unzip();
+            Shape { card, terms, learnt }
+        });
         shapes.into_iter().filter(|s| !s.terms.is_empty())
     }
 
@@ -68,8 +72,9 @@ impl Effect for Shape {
     }
 
     fn forward(&self, _: &Settings, exposure: &mut Exposure, _: &Draw) {
-        let (moving, still): (Vec<&Term>, Vec<&Term>) =
-            self.terms.iter().partition(|t| t.needs().session);
+        let learnt = self.terms.iter().zip(&self.learnt);
+        let (moving, still): (Vec<Learnt<'_>>, Vec<Learnt<'_>>) =
+            learnt.partition(|(t, _)| t.needs().session);
         let at_rest = |e: &Exposure| values(&still, e);
         exposure.with_kept(Kept::Shape(self.card.id), at_rest, |exposure, at_rest| {
             if moving.is_empty() {
@@ -103,14 +108,17 @@ fn rounding_variance(exposure: &Exposure) -> impl Fn(f32) -> f32 + use<> {
     }
 }
 
+type Learnt<'a> = (&'a Term, &'a [f64; 2]);
+
 /// Sum of the terms at each pixel; zero where nothing is seen.
-fn values(terms: &[&Term], exposure: &Exposure) -> Vec<f32> {
+fn values(terms: &[Learnt<'_>], exposure: &Exposure) -> Vec<f32> {
     let seen = exposure.seen;
     let mut sums = vec![0f32; seen.depth.len()];
     if terms.is_empty() {
         return sums;
     }
-    let scene = Scene::of(exposure, terms.iter().fold(Needs::default(), |n, t| n.and(t.needs())));
+    let scene =
+        Scene::of(exposure, terms.iter().fold(Needs::default(), |n, (t, _)| n.and(t.needs())));
     sums.par_chunks_mut(seen.width).enumerate().for_each(|(row, line)| {
         for (u, sum) in line.iter_mut().enumerate() {
             let i = row * seen.width + u;
@@ -118,8 +126,8 @@ fn values(terms: &[&Term], exposure: &Exposure) -> Vec<f32> {
                 continue;
             }
             let place = scene.place(i);
-            let applies = |t: &&&Term| scene.knows(t, i);
-            *sum = terms.iter().filter(applies).map(|t| t.value(&place)).sum::<f64>() as f32;
+            let applies = terms.iter().filter(|(t, _)| scene.knows(t, i));
+            *sum = applies.map(|(t, learnt)| t.held_value(**learnt, &place)).sum::<f64>() as f32;
         }
     });
     sums

@@ -1,10 +1,10 @@
 //! What exported programs need of a model: one list of terms, written once for each language.
 
 use super::expressions::{Expressions, number, sigma};
-use crate::correct::{Correction, LearntTerm};
+use crate::correct::Correction;
 use crate::error::Result;
 use crate::model::NoiseModel;
-use crate::terms::Term;
+use crate::terms::{LearntTerm, Term};
 use crate::view::Sensor;
 
 /// A term of the program: its expression, and when it applies.

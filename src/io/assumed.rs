@@ -235,9 +235,10 @@ impl Assumed {
             });
         }
         match sensor.fault() {
-            Some(what) => {
-                Err(Error::Argument { what, remedy: "correct the option, or what the recording says" })
-            }
+            Some(what) => Err(Error::Argument {
+                what,
+                remedy: "correct the option, or what the recording says",
+            }),
             None => Ok(sensor),
         }
     }

@@ -86,5 +86,5 @@ impl Features {
 }
 
 fn failed(e: opencv::Error) -> Error {
-    Error::Solver { what: format!("OpenCV: {e}"), remedy: "map without it: --init none" }
+    Error::Argument { what: format!("OpenCV: {e}"), remedy: "map without it: --init none" }
 }

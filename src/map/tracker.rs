@@ -133,7 +133,8 @@ impl<'a> Tracker<'a> {
         here.motion_to(there, &mut rng)
     }
 
-    /// Aligns a frame; the result is in the frame of the last camera.
+    /// Aligns a frame; the result is in the frame of the last camera. With the model its covariance and its
+    /// degenerate directions are in the map's.
     fn align(
         &self,
         last: &Prepared,

@@ -29,9 +29,6 @@ const MAX_FOLDS: usize = 8;
 pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
     let folds = folds(table);
     let count = folds.iter().map(|(_, fold)| fold + 1).max()?;
-    if count < 3 {
-        return None;
-    }
     let fold_of = |view: usize| folds.iter().find(|(v, _)| *v == view).map_or(0, |(_, f)| *f);
     let (mut score, mut square, mut chi2, mut views) = (0.0, 0.0, 0.0, 0.0);
     for left_out in 0..count {
@@ -92,7 +89,7 @@ pub fn compare_forms(table: &SigmaTable) -> Vec<HeldOut> {
     scores
 }
 
-/// Each view with its fold, by mean distance.
+/// Each view with its fold, by mean distance; empty with fewer than three distances.
 fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
     let mut views: Vec<(usize, f64)> = table
         .views()
@@ -111,9 +108,10 @@ fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
         }
         groups.push(group);
     }
-    if group + 1 > MAX_FOLDS || group < 2 {
-        let n = views.len();
-        groups = (0..n).map(|i| i * MAX_FOLDS.min(n) / n).collect();
+    if group < 2 {
+        return Vec::new();
     }
+    let (distances, count) = (group + 1, MAX_FOLDS.min(group + 1));
+    groups.iter_mut().for_each(|group| *group = *group * count / distances);
     views.into_iter().zip(groups).map(|((view, _), fold)| (view, fold)).collect()
 }

@@ -14,7 +14,7 @@ use crate::Progress;
 use crate::camera::Rays;
 use crate::effects::{Active, Instant};
 use crate::error::{Error, Result};
-use crate::frame::{DepthCode, Frame, KINECT_NO_MEASUREMENT};
+use crate::frame::{DepthCode, Frame};
 use crate::io::{
     encode_png16, encode_png16_quickly, refuse_full, write_atomic, write_recording_file,
     write_view_notes,
@@ -93,7 +93,7 @@ impl Shoot {
         refuse_full(root)?;
         std::fs::create_dir_all(root).map_err(|e| Error::write(root, e))?;
         let speckle = match &self.physics {
-            Physics::Speckle { causes } => Some(SpeckleSensor::new(&self.sensor, causes.clone())),
+            Physics::Speckle { causes } => Some(SpeckleSensor::new(&self.sensor, causes.clone())?),
             Physics::Formula { .. } => None,
         };
         let described = speckle.as_ref().map_or(&self.sensor, SpeckleSensor::described);
@@ -167,7 +167,7 @@ impl Shoot {
             let mut shot = filming.shoot(instant);
             if let Some(mask) = &view.mask {
                 let hidden = shot.depth.raw.iter_mut().zip(mask).filter(|(_, shown)| !**shown);
-                hidden.for_each(|(word, _)| *word = KINECT_NO_MEASUREMENT);
+                hidden.for_each(|(word, _)| *word = sensor.described().code.invalid());
             }
             folder.add(stamp, &shot.depth, self.infrared.then_some(&shot.infrared))?;
         }

@@ -64,6 +64,12 @@ impl Statistic {
     }
 }
 
+/// A term of a model with the range of disparities at which it was learnt, px.
+pub type LearntTerm = (Term, [f64; 2]);
+
+/// Range of a term that does not state where it was learnt.
+pub const ANYWHERE: [f64; 2] = [0.0, f64::INFINITY];
+
 /// Splits numbers written one after the other, one per coefficient, by term. With fewer numbers, the last
 /// terms go without.
 pub fn by_term<'a>(
@@ -93,6 +99,12 @@ impl Term {
     /// Value at a place, px or nepers of variance.
     pub fn value(&self, p: &PixelContext) -> f64 {
         self.basis.value(&self.coefficients, p)
+    }
+
+    /// Value at a place, with the disparity clamped to the range, px, in which the term was learnt if it is
+    /// fixed in the picture and scales with the disparity.
+    pub fn held_value(&self, learnt_px: [f64; 2], p: &PixelContext) -> f64 {
+        self.value(&self.basis.held(learnt_px, p))
     }
 
     /// Sum of these terms at a place.

@@ -4,7 +4,7 @@ use super::basis::Basis;
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::needs::Needs;
-use super::place::Axis;
+use super::place::{Axis, PixelContext};
 use super::{Statistic, Term};
 
 impl Basis {
@@ -92,6 +92,16 @@ impl Basis {
     /// periodic shapes, which have next to no affine part.
     pub fn still_power(&self) -> Option<f64> {
         self.power_in_picture().filter(|_| self.period().is_none())
+    }
+
+    /// The place, with its disparity clamped to the range, px, in which a shape was learnt that is fixed in
+    /// the picture and scales with the disparity.
+    pub fn held(&self, [low, high]: [f64; 2], place: &PixelContext) -> PixelContext {
+        let inside = (low..=high).contains(&place.disparity);
+        if inside || self.still_power().is_none() {
+            return *place;
+        }
+        PixelContext { disparity: place.disparity.clamp(low, high), ..*place }
     }
 
     /// Same power, of periodic shapes too.

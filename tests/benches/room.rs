@@ -20,7 +20,7 @@ fn frames(c: &mut Criterion) {
         seed: Seed(1),
     };
     let rays = film.sensor.camera.rays();
-    let mut shutter = Shutter::new(&film, &film.sensor, &rays);
+    let mut shutter = Shutter::new(&film, &film.sensor, &rays).unwrap();
     let camera = RoomCamera::new(&film.room, &film.sensor.camera, &rays);
     let mut group = c.benchmark_group("room");
     group.sample_size(20);

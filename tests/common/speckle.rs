@@ -48,7 +48,7 @@ pub struct Watch {
 }
 
 pub fn watch(causes: &Causes, bench: &Bench, frames: usize, seed: u64) -> Watch {
-    let sensor = SpeckleSensor::new(&kinect(), causes.clone());
+    let sensor = SpeckleSensor::new(&kinect(), causes.clone()).unwrap();
     let instants: Vec<Instant> = (0..frames)
         .map(|frame| Instant { view: 0, frame, session_s: 0.0, view_s: frame as f64 / 30.0 })
         .collect();

@@ -337,7 +337,7 @@ fn depth_scatters_by_the_models_sigma() {
         seed: Seed(3),
     };
     let rays = film.sensor.camera.rays();
-    let mut shutter = Shutter::new(&film, &film.sensor, &rays);
+    let mut shutter = Shutter::new(&film, &film.sensor, &rays).unwrap();
     let (picture, depth) = shutter.shoot(100..101).remove(0);
     let mut scores: Vec<f64> = Vec::new();
     for (i, &word) in depth.raw.iter().enumerate() {
@@ -485,7 +485,7 @@ fn a_room_is_filmed_by_light() {
         };
         let rays = film.sensor.camera.rays();
         let sensor = Sensor { code: Film::CODE, ..film.sensor.clone() };
-        let shots = Shutter::new(&film, &sensor, &rays).shoot(0..2);
+        let shots = Shutter::new(&film, &sensor, &rays).unwrap().shoot(0..2);
         let pixels_m = sensor.camera.fx * sensor.baseline_m.unwrap();
         let errors = |(picture, depth): &(Picture, Frame)| -> Vec<f64> {
             let (width, seen) = (depth.width, &picture.seen);

@@ -249,7 +249,7 @@ fn warmth_turns_the_plane_and_scales_the_depth() {
 
 /// The frame at 100 time constants.
 fn watch_late(causes: &Causes) -> Watch {
-    let sensor = SpeckleSensor::new(&kinect(), causes.clone());
+    let sensor = SpeckleSensor::new(&kinect(), causes.clone()).unwrap();
     let instant = Instant { view: 0, frame: 0, session_s: 100.0, view_s: 0.0 };
     Watch::take(&sensor, &frontal(2.0), &[instant], Seed(9))
 }

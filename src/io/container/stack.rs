@@ -111,10 +111,12 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     };
     let all: Vec<usize> = (0..arrays.len()).collect();
     let chosen = match (&assumed.topic, &stacks[..]) {
-        (Some(topic), _) => arrays.iter().position(|a| a.name == Some(topic.clone())).ok_or_else(|| {
-            let what = format!("there is no array {topic}; these are: {}", names(&all));
-            Error::recording(path, what, "give one of them to --topic")
-        })?,
+        (Some(topic), _) => {
+            arrays.iter().position(|a| a.name == Some(topic.clone())).ok_or_else(|| {
+                let what = format!("there is no array {topic}; these are: {}", names(&all));
+                Error::recording(path, what, "give one of them to --topic")
+            })?
+        }
         (None, [only]) => *only,
         (None, []) => {
             if let Some(unread) = unread {
@@ -239,7 +241,8 @@ fn film(array: Array, beside: Beside, assumed: &Assumed) -> Result<(Footage, Sen
         s.len() == count && times && s.is_sorted_by(|a, b| a <= b)
     };
     if !stamps.as_ref().is_none_or(are_times) {
-        let what = format!("its {count} images do not have as many timestamps in seconds, in order");
+        let what =
+            format!("its {count} images do not have as many timestamps in seconds, in order");
         return Err(array.wrong(what, "save one a frame, in seconds"));
     }
     if let (None, Some([fx, fy, cx, cy])) = (assumed.intrinsics, beside.intrinsics) {

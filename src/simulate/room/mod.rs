@@ -84,7 +84,7 @@ impl Film {
         }
         let sensor = Sensor { code: Self::CODE, ..self.sensor.clone() };
         let rays = sensor.camera.rays();
-        let mut shutter = Shutter::new(self, &sensor, &rays);
+        let mut shutter = Shutter::new(self, &sensor, &rays)?;
         let mut blind = 0;
         let block = FRAMES_A_THREAD * rayon::current_num_threads();
         for (k, poses) in self.poses.chunks(block).enumerate() {

@@ -10,6 +10,7 @@ use super::render::{Picture, RoomCamera};
 use super::{Film, Pose};
 use crate::camera::Rays;
 use crate::effects::{Acting, Active, Instant};
+use crate::error::Result;
 use crate::frame::{DepthCode, Frame};
 use crate::model::{SigmaLookup, SigmaModel};
 use crate::scene::Seen;
@@ -44,18 +45,20 @@ enum DepthCamera<'a> {
 
 impl<'a> Shutter<'a> {
     /// `sensor` and `rays` describe the same camera; depth words are written in the sensor's code.
-    pub fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Self {
+    /// Fails as [`SpeckleSensor::new`].
+    pub fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Result<Self> {
         let depth = match &film.physics {
             Physics::Formula { sigma, effects } => {
                 DepthCamera::formula(sensor, rays, sigma, effects, film)
             }
             Physics::Speckle { causes } => DepthCamera::Speckle {
                 // The sensor's words have the code of its read-out; what is written has another.
-                sensor: Box::new(SpeckleSensor::new(&film.sensor, causes.clone())),
+                sensor: Box::new(SpeckleSensor::new(&film.sensor, causes.clone())?),
                 code: sensor.code,
             },
         };
-        Shutter { film, camera: RoomCamera::new(&film.room, &sensor.camera, rays), depth }
+        let camera = RoomCamera::new(&film.room, &sensor.camera, rays);
+        Ok(Shutter { film, camera, depth })
     }
 
     /// Takes consecutive frames; the effects' memory carries over from one to the next.
@@ -151,7 +154,7 @@ mod tests {
         };
         let rays = film.sensor.camera.rays();
         let frames = 0..film.poses.len();
-        let mut shutter = Shutter::new(&film, &film.sensor, &rays);
+        let mut shutter = Shutter::new(&film, &film.sensor, &rays).unwrap();
         shutter.shoot(frames).into_iter().map(|(_, depth)| depth).collect()
     }
 

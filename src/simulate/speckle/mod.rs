@@ -26,7 +26,8 @@ use reference::{Candidates, REFERENCE_M, ReadOut, Reference};
 
 use crate::camera::Camera;
 use crate::effects::Instant;
-use crate::frame::{Frame, KINECT_NO_MEASUREMENT};
+use crate::error::{Error, Result};
+use crate::frame::Frame;
 use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
 use crate::scene::{Bench, Seen, Target, WHITE, World};
@@ -55,9 +56,15 @@ pub struct SpeckleShot {
 
 impl SpeckleSensor {
     /// A sensor with the camera and baseline of `sensor` (0.075 m where it has none).
-    pub fn new(sensor: &Sensor, causes: Causes) -> Self {
+    /// Fails if the unknown lens folds the image within its corners.
+    pub fn new(sensor: &Sensor, causes: Causes) -> Result<Self> {
         let baseline_m = sensor.baseline_m.unwrap_or(KINECT_BASELINE_M);
         let camera = with_unknown_lens(&sensor.camera, &causes);
+        if let Some(fault) = camera.fault() {
+            let what =
+                format!("lens_k1 = {}, lens_k2 = {}: {fault}", causes.lens_k1, causes.lens_k2);
+            return Err(Error::Argument { what, remedy: "give smaller ones" });
+        }
         let disparity_px_m = camera.fx * baseline_m;
         let candidates = Candidates::of(disparity_px_m);
         let nearest_px = candidates.last() as f64;
@@ -66,8 +73,8 @@ impl SpeckleSensor {
         let picture = record_reference(&camera, baseline_m, &causes, &pattern, candidates);
         let reference = Reference::store(&picture, candidates, causes.half_window());
         let described =
-            Sensor { baseline_m: Some(baseline_m), code: read_out.code(), ..sensor.clone() };
-        SpeckleSensor { described, camera, baseline_m, causes, pattern, reference, read_out }
+            Sensor { baseline_m: Some(baseline_m), code: read_out.code, ..sensor.clone() };
+        Ok(SpeckleSensor { described, camera, baseline_m, causes, pattern, reference, read_out })
     }
 
     pub fn described(&self) -> &Sensor {
@@ -123,7 +130,7 @@ impl SpeckleSensor {
         let confidence = self.causes.confidence as f32;
         let value = |(&shift, &correlation): (&f32, &f32)| {
             let sure = shift.is_finite() && correlation >= confidence;
-            if sure { self.read_out.raw(shift) } else { KINECT_NO_MEASUREMENT }
+            if sure { self.read_out.raw(shift) } else { self.described.code.invalid() }
         };
         Frame {
             width: infrared.width,

@@ -72,8 +72,7 @@ pub struct ReadOut {
     coarse_px: Option<f64>,
     /// fx * baseline, px m.
     disparity_px_m: f64,
-    offset: f64,
-    slope: f64,
+    pub code: DepthCode,
 }
 
 impl ReadOut {
@@ -87,26 +86,22 @@ impl ReadOut {
         // shift = fx b (1/z - 1/reference) and shift = (at_reference - raw) raw_px, hence
         // 1/z = 1/reference + (at_reference - raw) raw_px / (fx b).
         let per_raw = raw_px / disparity_px_m;
-        let (offset, slope) = match *own {
-            DepthCode::Disparity { offset, slope, .. } => (offset, slope),
-            DepthCode::Metric { .. } => (1.0 / REFERENCE_M + at_reference * per_raw, -per_raw),
+        let code = match *own {
+            DepthCode::Disparity { .. } => *own,
+            DepthCode::Metric { .. } => DepthCode::Disparity {
+                offset: 1.0 / REFERENCE_M + at_reference * per_raw,
+                slope: -per_raw,
+                invalid: KINECT_NO_MEASUREMENT,
+            },
         };
         let coarse_px = (step_px > USUAL_STEP_PX).then_some(step_px);
-        ReadOut { coarse_px, disparity_px_m, offset, slope }
+        ReadOut { coarse_px, disparity_px_m, code }
     }
 
     pub fn raw(&self, shift_px: f32) -> u16 {
         let shift = f64::from(shift_px);
         let shift = self.coarse_px.map_or(shift, |step| (shift / step).round() * step);
-        let inverse = 1.0 / REFERENCE_M + shift / self.disparity_px_m;
-        let raw = ((inverse - self.offset) / self.slope).round();
-        let fits = raw > 0.0 && raw < f64::from(KINECT_NO_MEASUREMENT);
-        if fits { raw as u16 } else { KINECT_NO_MEASUREMENT }
-    }
-
-    pub fn code(&self) -> DepthCode {
-        let (offset, slope) = (self.offset, self.slope);
-        DepthCode::Disparity { offset, slope, invalid: KINECT_NO_MEASUREMENT }
+        self.code.raw(1.0 / (1.0 / REFERENCE_M + shift / self.disparity_px_m))
     }
 }
 
@@ -226,10 +221,10 @@ mod tests {
         for z in [0.5, 1.0, 2.0, 3.3] {
             let shift = 580.0 * 0.075 / z - 580.0 * 0.075 / REFERENCE_M;
             let raw = read_out.raw(shift as f32);
-            let found = read_out.code().metres(raw).unwrap();
+            let found = read_out.code.metres(raw).unwrap();
             assert!((found - z).abs() <= 0.5 * 2.88e-3 * z * z, "{z}: {found}");
         }
-        let DepthCode::Disparity { offset, slope, .. } = read_out.code() else { unreachable!() };
+        let DepthCode::Disparity { offset, slope, .. } = read_out.code else { unreachable!() };
         assert!((offset / -slope - 1084.6).abs() < 1.0, "infinity is where a Kinect has it");
     }
 
@@ -237,12 +232,12 @@ mod tests {
     #[test]
     fn the_code_does_not_betray_the_step() {
         let metric = DepthCode::Metric { units_per_metre: 5000.0, invalid: 0 };
-        let code = |step| ReadOut::new(step, 43.5, 90.0, &metric).code();
+        let code = |step| ReadOut::new(step, 43.5, 90.0, &metric).code;
         assert_eq!(code(0.125), code(0.5));
         let own =
             DepthCode::Disparity { offset: 3.12, slope: -0.00286, invalid: KINECT_NO_MEASUREMENT };
         let read_out = ReadOut::new(0.5, 43.5, 90.0, &own);
-        assert_eq!(read_out.code(), own);
+        assert_eq!(read_out.code, own);
         let raw: std::collections::BTreeSet<u16> =
             (0..4000).map(|k| read_out.raw(k as f32 * 0.01)).collect();
         assert!((70..=90).contains(&raw.len()), "40 px in half pixels: {}", raw.len());
