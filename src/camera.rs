@@ -23,71 +23,6 @@ pub struct Camera {
     pub distortion: Option<[f64; 5]>,
 }
 
-/// What can be wrong with a [`Camera`].
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum CameraFault {
-    /// No pixels, or more than any sensor has: width, height, px.
-    #[error("width x height, {0} x {1} px, is no image size")]
-    Size(usize, usize),
-    /// fx, fy, px.
-    #[error("{}: focal lengths fx = {}, fy = {} px must be positive", bad_focal(*.0), shortest(*.0), shortest(*.1))]
-    FocalLength(f64, f64),
-    #[error("the principal point cx, cy is not finite")]
-    PrincipalPoint,
-    /// cx, cy, width, height, px.
-    #[error(
-        "{}: the principal point ({}, {}) lies outside the image of {} x {} px; check the order fx, fy, cx, cy and \
-         that they belong to this image size", bad_centre(*.0, *.1), shortest(.0[0]), shortest(.0[1]), .1[0], .1[1]
-    )]
-    Outside([f64; 2], [usize; 2]),
-    /// fx, fy, px.
-    #[error(
-        "fx = {} and fy = {} px differ by more than a quarter, which no depth sensor's do; check the order fx, fy, \
-         cx, cy", shortest(*.0), shortest(*.1)
-    )]
-    Aspect(f64, f64),
-    /// The horizontal field of view, rad.
-    #[error(
-        "a field of view of {:.1} degrees is no depth sensor's ({} to {}); check fx, and that it belongs to this image \
-         size", .0.to_degrees(), FIELD_DEG[0], FIELD_DEG[1]
-    )]
-    FieldOfView(f64),
-    #[error("the distortion coefficients are not finite")]
-    Coefficients,
-    /// A pixel without a ray: undistortion does not converge there.
-    #[error(
-        "distortion {} has no ray for pixel ({u}, {v}); check the order of the coefficients and that they \
-         belong to these fx, fy",
-        listed(k)
-    )]
-    NoRay {
-        /// k1, k2, p1, p2, k3.
-        k: [f64; 5],
-        u: usize,
-        v: usize,
-    },
-    #[error(
-        "distortion {}: p1 and p2 lie within -{} and {} (lenses have some thousandths); check the order of the \
-         coefficients", listed(.0), TANGENTIAL, TANGENTIAL
-    )]
-    Tangential([f64; 5]),
-    /// The image folds back on itself: rays farther out map to pixels farther in.
-    #[error(
-        "distortion {} folds the image inside its corners; check the order of the coefficients and that they \
-         belong to these fx, fy", listed(.0)
-    )]
-    Fold([f64; 5]),
-}
-
-/// The wrong key. Messages begin with it, and its line in the file is found by it.
-fn bad_focal(fx: f64) -> &'static str {
-    if fx.is_finite() && fx > 0.0 { "fy" } else { "fx" }
-}
-
-fn bad_centre([cx, _]: [f64; 2], [width, _]: [usize; 2]) -> &'static str {
-    if inside(cx, width) { "cy" } else { "cx" }
-}
-
 fn listed(k: &[f64; 5]) -> String {
     format!("[k1, k2, p1, p2, k3] = [{}]", k.map(shortest).join(", "))
 }
@@ -99,44 +34,68 @@ impl Camera {
         Camera { width, height, fx: focal_px, fy: focal_px, cx, cy, distortion: None }
     }
 
-    /// What is wrong with these numbers, if anything. With a lens model every pixel is checked.
-    pub fn fault(&self) -> Option<CameraFault> {
+    /// What is wrong with these numbers, if anything; begins with the wrong key, by which its line in the file
+    /// is found. With a lens model every pixel is checked.
+    pub fn fault(&self) -> Option<String> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let Camera { width, height, fx, fy, cx, cy, distortion } = *self;
-        if !usable_size(width, height) {
-            Some(CameraFault::Size(width, height))
+        let [focal_x, focal_y, x, y] = [fx, fy, cx, cy].map(shortest);
+        let (field_deg, [narrow, wide]) = (self.field_of_view().to_degrees(), FIELD_DEG);
+        Some(if !usable_size(width, height) {
+            format!("width x height, {width} x {height} px, is no image size")
         } else if !positive(fx) || !positive(fy) {
-            Some(CameraFault::FocalLength(fx, fy))
+            let key = if positive(fx) { "fy" } else { "fx" };
+            format!("{key}: focal lengths fx = {focal_x}, fy = {focal_y} px must be positive")
         } else if !cx.is_finite() || !cy.is_finite() {
-            Some(CameraFault::PrincipalPoint)
+            "the principal point cx, cy is not finite".into()
         } else if !inside(cx, width) || !inside(cy, height) {
-            Some(CameraFault::Outside([cx, cy], [width, height]))
+            let key = if inside(cx, width) { "cy" } else { "cx" };
+            format!(
+                "{key}: the principal point ({x}, {y}) lies outside the image of {width} x {height} px; check the \
+                 order fx, fy, cx, cy and that they belong to this image size"
+            )
         } else if !(1.0 / MAX_ASPECT..=MAX_ASPECT).contains(&(fx / fy)) {
-            Some(CameraFault::Aspect(fx, fy))
-        } else if !(FIELD_DEG[0]..=FIELD_DEG[1]).contains(&self.field_of_view().to_degrees()) {
-            Some(CameraFault::FieldOfView(self.field_of_view()))
+            format!(
+                "fx = {focal_x} and fy = {focal_y} px differ by more than a quarter, which no depth sensor's do; \
+                 check the order fx, fy, cx, cy"
+            )
+        } else if !(narrow..=wide).contains(&field_deg) {
+            format!(
+                "a field of view of {field_deg:.1} degrees is no depth sensor's ({narrow} to {wide}); check fx, and \
+                 that it belongs to this image size"
+            )
         } else {
-            distortion.and_then(|k| self.lens_fault(k))
-        }
+            return distortion.and_then(|k| self.lens_fault(&k));
+        })
     }
 
-    fn lens_fault(&self, k: [f64; 5]) -> Option<CameraFault> {
+    fn lens_fault(&self, k: &[f64; 5]) -> Option<String> {
+        const BELONG: &str =
+            "check the order of the coefficients and that they belong to these fx, fy";
         if k.iter().any(|v| !v.is_finite()) {
-            return Some(CameraFault::Coefficients);
+            return Some("the distortion coefficients are not finite".into());
         }
         if k[2].abs().max(k[3].abs()) > TANGENTIAL {
-            return Some(CameraFault::Tangential(k));
+            return Some(format!(
+                "distortion {}: p1 and p2 lie within -{TANGENTIAL} and {TANGENTIAL} (lenses have some thousandths); \
+                 check the order of the coefficients",
+                listed(k)
+            ));
         }
         let mut farthest: f64 = 0.0;
         for v in 0..self.height {
             for (u, (x, y)) in self.row(v).enumerate() {
+                // Undistortion does not converge there.
                 if x.is_nan() || y.is_nan() {
-                    return Some(CameraFault::NoRay { k, u, v });
+                    let what = format!("has no ray for pixel ({u}, {v})");
+                    return Some(format!("distortion {} {what}; {BELONG}", listed(k)));
                 }
                 farthest = farthest.max(x * x + y * y);
             }
         }
-        folds(&k, farthest).then_some(CameraFault::Fold(k))
+        // Rays farther out map to pixels farther in.
+        let what = "folds the image inside its corners";
+        folds(k, farthest).then(|| format!("distortion {} {what}; {BELONG}", listed(k)))
     }
 
     /// Horizontal field of view, ignoring distortion, rad.

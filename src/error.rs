@@ -16,10 +16,7 @@ pub enum Error {
     /// A line of a text file (JSON, `depth.txt`, a table) that cannot be parsed; 0 means the whole file.
     #[error("{}{}: {what}; {remedy}", path.display(), at_line(*line))]
     Text { path: PathBuf, line: usize, what: String, remedy: &'static str },
-    /// An image that is damaged or not of the expected kind.
-    #[error("{}: {what}; {remedy}", path.display())]
-    Image { path: PathBuf, what: String, remedy: &'static str },
-    /// A folder that holds no recording, or one that contradicts itself.
+    /// A file or folder that is damaged, contradicts itself, or is not of the expected kind.
     #[error("{}: {what}; {remedy}", path.display())]
     Recording { path: PathBuf, what: String, remedy: &'static str },
     /// A view in which no target plane can be found.
@@ -28,9 +25,6 @@ pub enum Error {
     /// Too little, or too uniform, to fit what was asked for.
     #[error("{what}; {remedy}")]
     NotEnough { what: String, remedy: String },
-    /// A model file that is foreign, damaged or newer than this program.
-    #[error("{}: {what}; {remedy}", path.display())]
-    ModelFile { path: PathBuf, what: String, remedy: &'static str },
     /// An option or argument outside its range.
     #[error("{what}; {remedy}")]
     Argument { what: String, remedy: &'static str },
@@ -97,9 +91,5 @@ impl Error {
 
     pub(crate) fn sensor(what: impl Into<String>, remedy: &'static str) -> Self {
         Error::Sensor { what: what.into(), remedy }
-    }
-
-    pub(crate) fn image(path: &Path, what: impl Into<String>, remedy: &'static str) -> Self {
-        Error::Image { path: path.to_path_buf(), what: what.into(), remedy }
     }
 }

@@ -18,7 +18,7 @@ use crate::Progress;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::{DepthCode, Frame};
-use crate::sensors::SensorKind;
+use crate::sensors::{KINECT_BASELINE_M, SensorKind};
 use crate::units::shortest;
 
 /// Accepted baselines, m: from half that of the smallest structured-light module (1 cm) to twice that of
@@ -54,6 +54,11 @@ impl Sensor {
         self.baseline_m.filter(|_| self.may_have_disparity()).map(|b| self.camera.fx * b)
     }
 
+    /// Same, with a Kinect's baseline where there is none.
+    pub fn scale_px_m(&self) -> f64 {
+        self.disparity_px_m().unwrap_or(self.camera.fx * KINECT_BASELINE_M)
+    }
+
     /// Whether it is not known to be a time-of-flight camera.
     pub fn may_have_disparity(&self) -> bool {
         self.kind.is_none_or(SensorKind::has_disparity)
@@ -61,7 +66,7 @@ impl Sensor {
 
     /// What is wrong with these numbers, if anything.
     pub fn fault(&self) -> Option<String> {
-        let camera = self.camera.fault().map(|fault| fault.to_string());
+        let camera = self.camera.fault();
         let uncertainty = || self.intrinsics_uncertainty?.fault(&self.camera);
         let numbers = camera.or_else(|| self.code.fault()).or_else(|| self.baseline_fault());
         numbers.or_else(uncertainty).or_else(|| self.name_fault())

@@ -75,7 +75,7 @@ fn swapped_and_misplaced_numbers_are_named() {
 fn a_lens_that_does_not_reach_the_corners_is_named() {
     let camera = behind([-0.8, 0.0, 0.0, 0.0, 0.0]);
     let fault = camera.fault().expect("no ray");
-    assert!(matches!(fault, CameraFault::NoRay { u: 0, v: 0, .. }), "{fault:?}");
+    assert!(fault.contains("no ray for pixel (0, 0)"), "{fault}");
     assert!(fault.to_string().contains("[-0.8, 0, 0, 0, 0]"), "{fault}");
     assert!(camera.ray(0.0, 0.0).0.is_nan() && camera.ray(320.0, 240.0).0.is_finite());
 }

@@ -298,7 +298,7 @@ pub fn numbers<const N: usize>(
 }
 
 /// Creation time to write into results: SOURCE_DATE_EPOCH, the convention of reproducible builds, in s
-/// since 1970; `None` (the current time) where it is not set.
+/// since 1970; `None` (the current time) where it is no such number or not set.
 pub fn source_date() -> Option<SystemTime> {
     let seconds = std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()?;
     SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(seconds))

@@ -2,6 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::compare::{compare, of_the_paper, past_the_paper, tables};
+use kinoise::io::pretty_json;
 use kinoise::report::{comparison_charts, comparison_page};
 use kinoise::sequence::open;
 
@@ -54,7 +55,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         compare(&sequence, &model, &variants, arguments.repeats, global.seed(), &progress)?;
     let text = tables::text(&comparison);
     let json = tables::json(&comparison);
-    output.write("tables.json", serde_json::to_string_pretty(&json)?.as_bytes())?;
+    output.write("tables.json", pretty_json(&json)?.as_bytes())?;
     output.write("tables.txt", text.as_bytes())?;
     for (name, chart) in comparison_charts(&comparison) {
         output.write(name, chart.svg()?.as_bytes())?;

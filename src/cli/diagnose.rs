@@ -8,7 +8,7 @@ use kinoise::diagnose::{
     diagnose_against, pictures,
 };
 use kinoise::effects::{Active, Instant};
-use kinoise::io::{Assumed, DESCRIPTION, OutputFolder, open};
+use kinoise::io::{Assumed, DESCRIPTION, OutputFolder, open, pretty_json};
 use kinoise::report::{DiagnosisPage, Step, diagnosis_page, story, subject};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::view::ViewNotes;
@@ -46,7 +46,7 @@ pub struct Arguments {
     input: Input,
 }
 
-/// Below this, `calibrate` writes no model of a fit either.
+/// Below this share of the sigmas' variance a fit explains nothing.
 const MIN_R2: f64 = 0.5;
 /// Exit code when a mismatch was found.
 const FOUND: u8 = 1;
@@ -127,7 +127,7 @@ pub fn examine(
     })?;
     let diagnosis = &done.diagnosis;
     let json = serde_json::to_value(diagnosis)?;
-    out.write("diagnosis.json", format!("{json:#}\n").as_bytes())?;
+    out.write("diagnosis.json", pretty_json(&json)?.as_bytes())?;
     done.model.write(&out.path().join("model.json"))?;
     let title = format!("What the {} of {} leaves out", subject(diagnosis), recording.sensor.name);
     working("drawing the page", |_| -> anyhow::Result<()> {

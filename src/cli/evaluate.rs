@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use kinoise::evaluate::{Delta, Evaluation, Spread, clock_offset, evaluate};
-use kinoise::io::OutputFolder;
+use kinoise::io::{OutputFolder, pretty_json};
 use kinoise::report::{Against, Origin, evaluation_page};
 use kinoise::trajectory::{Pose, read_benchmark};
 use kinoise::units::{counted, shortest};
@@ -32,13 +32,13 @@ pub struct Arguments {
     /// The interval over which the relative error is taken
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_hyphen_values = true, value_parser = between(DELTA_S[0], MAX_FRAMES as f64, "s or frames"))]
     delta: f64,
+    /// The unit of that interval
+    #[arg(long, value_enum, default_value = "s", value_name = "UNIT")]
+    delta_unit: Unit,
     /// Seconds to add to the estimate's times first, or auto: as many as both trajectories' turning
     /// says (it is found always, and told where it is significant)
     #[arg(long, value_name = "S|auto", value_parser = offset, allow_hyphen_values = true)]
     offset: Option<Offset>,
-    /// The unit of that interval
-    #[arg(long, value_enum, default_value = "s", value_name = "UNIT")]
-    delta_unit: Unit,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -107,8 +107,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let delta = arguments.delta()?;
     let truth_file = file_in(&arguments.truth, "groundtruth.txt");
     let estimate_file = file_in(&arguments.estimate, "trajectory.txt");
-    let [truth, mut estimate] =
-        [read_benchmark(&truth_file)?.poses, read_benchmark(&estimate_file)?.poses];
+    let [truth, mut estimate] = [read_benchmark(&truth_file)?, read_benchmark(&estimate_file)?];
     let inputs = [&*truth_file, &*estimate_file];
     let new = |place: &PathBuf| begin(place, EVALUATION, &inputs, global);
     let output = arguments.output.as_ref().map(new).transpose()?;
@@ -134,8 +133,7 @@ fn file_in(path: &Path, name: &str) -> PathBuf {
 }
 
 fn write(against: &Against<'_>, output: OutputFolder, origin: &Origin) -> anyhow::Result<()> {
-    let json = serde_json::to_string_pretty(&as_json(against.evaluation))?;
-    output.write("evaluation.json", format!("{json}\n").as_bytes())?;
+    output.write("evaluation.json", pretty_json(&as_json(against.evaluation))?.as_bytes())?;
     for (name, chart) in against.charts() {
         output.write(name, chart.svg()?.as_bytes())?;
     }
@@ -161,9 +159,9 @@ fn report(evaluation: &Evaluation, delta: Delta) {
 /// ATE and RPE, named as by the TUM scripts.
 pub fn as_json(evaluation: &Evaluation) -> Value {
     let mut value = json!({
-        "ate": spread(&evaluation.ate.error, "m"),
-        "rpe_translation": spread(&evaluation.rpe.translation, "m"),
-        "rpe_rotation": spread(&evaluation.rpe.rotation.scaled(1f64.to_degrees()), "deg"),
+        "ate": evaluation.ate.error.json("_m"),
+        "rpe_translation": evaluation.rpe.translation.json("_m"),
+        "rpe_rotation": evaluation.rpe.rotation.scaled(1f64.to_degrees()).json("_deg"),
     });
     if let Some(offset) = evaluation.offset {
         value["clock_offset"] =
@@ -173,9 +171,4 @@ pub fn as_json(evaluation: &Evaluation) -> Value {
         value["remarks"] = json!(evaluation.remarks);
     }
     value
-}
-
-fn spread(s: &Spread, unit: &str) -> Value {
-    let figures = s.figures().map(|(name, v)| (format!("{name}_{unit}"), json!(v)));
-    figures.into_iter().chain([("pairs".into(), json!(s.pairs))]).collect()
 }

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinoise::evaluate::{Delta, Evaluation, evaluate};
-use kinoise::io::OutputFolder;
+use kinoise::io::{OutputFolder, pretty_json};
 use kinoise::map::{
     self, Alignment, GATE_M, Init, Kernel, MAX_BLOCK_PX, MAX_ITERATIONS, MAX_OBSERVATIONS,
     MAX_READOUT_S, Mapped, Options, Stages, VOXEL_M, Weights, frames_csv, ply,
@@ -179,7 +179,7 @@ pub fn follow(
     };
     output.write("map.html", map_page(&page)?.as_bytes())?;
     output.write("frames.csv", frames_csv(&mapped.frames).as_bytes())?;
-    output.write("stats.json", serde_json::to_string_pretty(&stats)?.as_bytes())?;
+    output.write("stats.json", pretty_json(&stats)?.as_bytes())?;
     let folder = output.place().to_path_buf();
     output.finish()?;
     notes(&mapped.remarks);

@@ -16,7 +16,8 @@ use super::output::{METRICS, begin};
   kinoise metrics recording
   kinoise metrics recording -o out/metrics --json")]
 pub struct Arguments {
-    /// A recording, a TUM folder, a fakenect dump, or a folder of 16-bit PNGs
+    /// A recording, a TUM folder, a fakenect dump, a folder of 16-bit PNGs, a ROS bag (.bag, .mcap, .db3),
+    /// or a NumPy stack (.npy, .npz)
     recording: PathBuf,
     /// Folder for metrics.json and report.html
     #[arg(short, long, value_name = "DIR")]
@@ -33,6 +34,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     detail_recording(&recording);
     let found = working("measuring", |step| metrics(&recording, global.seed(), step))?;
     notes(&recording.remarks);
+    notes(&found.remarks);
     notes(found.excluded.iter().map(|[view, why]| format!("view {view} was left out: {why}")));
     report(&found);
     let value = serde_json::to_value(&found)?;

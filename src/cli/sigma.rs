@@ -4,6 +4,7 @@ use clap::Args;
 use kinoise::NoiseModel;
 use kinoise::correct::{SIGMA_UNITS_PER_METRE, sigma_images};
 use kinoise::sequence::open;
+use kinoise::units::counted;
 use serde_json::json;
 
 use super::common::{Global, Input, Thinning};
@@ -15,7 +16,8 @@ use super::output::{SIGMA, begin};
   kinoise sigma rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/desk-sigma
   kinoise sigma rgbd_dataset_freiburg1_desk -m out/kinect/model.json -o out/few --stride 10")]
 pub struct Arguments {
-    /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes
+    /// A sequence in the layout of the TUM RGB-D benchmark or of 7-Scenes, a ROS bag (.bag, .mcap, .db3), or a
+    /// NumPy stack (.npy, .npz)
     sequence: PathBuf,
     /// Folder for sigma/*.png (16 bit, 10 um a unit, 0 for no depth), sigma.txt and sigma.json
     #[arg(short, long, value_name = "DIR")]
@@ -56,7 +58,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }
     let (frames, mm, folder) = (written.frames, 1e3 * written.mean_m, arguments.output.display());
     let unit = "10 um a unit";
-    result(format!("wrote {frames} images of sigma, {mm:.2} mm on average, {unit}, into {folder}"));
+    let images = counted(frames, "image");
+    result(format!("wrote {images} of sigma, {mm:.2} mm on average, {unit}, into {folder}"));
     global.print_json(&json!({
         "frames": written.frames,
         "pixels": written.measured,

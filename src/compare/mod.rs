@@ -118,22 +118,27 @@ pub fn compare(
     let unmoved: Vec<Pose> = sequence.moments.iter().map(unmoved).collect();
     let still = evaluate(&sequence.truth, &unmoved, delta)?;
     let mut rows = Vec::new();
-    let total = variants.len() * repeats;
-    for (k, variant) in variants.iter().enumerate() {
+    // Without randomness every repeat is the same.
+    let runs = |v: &Variant| if v.options.init == Init::Orb { repeats } else { 1 };
+    let (mut done, total) = (0, variants.iter().map(runs).sum());
+    for variant in variants {
         let mut row = Row { variant: *variant, runs: Vec::new(), failed: None };
-        for repeat in 0..repeats {
-            progress(variant.name, k * repeats + repeat, total);
+        for repeat in 0..runs(variant) {
+            progress(variant.name, done, total);
+            done += 1;
             let seed = Seed(seed.0.wrapping_add(repeat as u64));
             match run(sequence, model, &Options { seed, ..variant.options }, delta) {
                 Ok(run) => row.runs.push(run),
                 Err(e) => row.failed = Some(e.to_string()),
             }
-            // Without randomness every repeat is the same.
-            if variant.options.init != Init::Orb {
-                break;
-            }
         }
         rows.push(row);
+    }
+    if let (true, Some(why)) =
+        (rows.iter().all(|r: &Row| r.runs.is_empty()), rows.iter().find_map(|r| r.failed.clone()))
+    {
+        let what = format!("no variant makes a map; the first: {why}");
+        return Err(Error::recording(&sequence.root, what, "put this right, then run again"));
     }
     let sequence_name = sequence.root.file_name().unwrap_or_default().to_string_lossy();
     Ok(Comparison {

@@ -138,14 +138,10 @@ pub fn json(comparison: &Comparison) -> Value {
 }
 
 fn evaluation(e: &Evaluation) -> Map<String, Value> {
-    let spread = |s: &Spread| {
-        json!({"rmse": s.rmse, "mean": s.mean, "median": s.median, "std": s.std,
-            "min": s.min, "max": s.max, "pairs": s.pairs})
-    };
     let figures = [
-        ("ate_m", spread(&e.ate.error)),
-        ("rpe_translation_m", spread(&e.rpe.translation)),
-        ("rpe_rotation_rad", spread(&e.rpe.rotation)),
+        ("ate_m", e.ate.error.json("")),
+        ("rpe_translation_m", e.rpe.translation.json("")),
+        ("rpe_rotation_rad", e.rpe.rotation.json("")),
     ];
     figures.map(|(name, value)| (name.to_string(), value)).into_iter().collect()
 }

@@ -21,14 +21,8 @@ impl Correction {
     /// becomes infinite where the errors leave no disparity.
     /// Fails if the image does not have the sensor's size.
     pub fn apply(&self, depth_m: &mut [f32], conditions: &Conditions) -> Result<()> {
-        self.refuse_size(depth_m)?;
-        if self.is_identity() {
-            return Ok(());
-        }
-        let known = self.known(depth_m, conditions);
-        depth_m.par_iter_mut().enumerate().filter(|(_, z)| **z > 0.0).for_each(|(i, z)| {
-            *z = self.depth(i, *z, &known) as f32;
-        });
+        let corrected = self.corrected(depth_m, conditions)?;
+        depth_m.iter_mut().zip(corrected).for_each(|(z, depth)| *z = depth as f32);
         Ok(())
     }
 

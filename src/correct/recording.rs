@@ -10,7 +10,7 @@ use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
 use crate::io::{
-    Assumed, Layout, is_corrected, open_uncut, refuse_full, refuse_inside, write_atomic,
+    Assumed, Layout, is_corrected, open_uncut, refuse_full, refuse_inside, write_json,
 };
 use crate::model::NoiseModel;
 
@@ -74,7 +74,7 @@ pub fn correct_recording(
             "units_per_metre": SIGMA_UNITS_PER_METRE,
             "invalid": 0,
         });
-        write_atomic(&folder.join("sigma.json"), format!("{about:#}\n").as_bytes())?;
+        write_json(&folder.join("sigma.json"), &about, "report this as a bug")?;
     }
     let mut corrected = rewrite.write(&images, &recording, progress)?;
     let already = |image: &&Image| is_corrected(&image.source.path);

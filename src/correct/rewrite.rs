@@ -99,6 +99,18 @@ pub(super) struct Rewrite<'a> {
 
 /// Units of 10 um: 16 bits hold 0.65 m.
 pub const SIGMA_UNITS_PER_METRE: f64 = 1e5;
+
+/// The largest value of an image.
+pub(super) const TOP: f64 = 65535.0;
+
+/// The value of a pixel. A measured pixel never gets the value for no depth.
+pub(super) fn sigma_word(sigma_m: f64) -> u16 {
+    if sigma_m.is_nan() {
+        0
+    } else {
+        (sigma_m * SIGMA_UNITS_PER_METRE).round().clamp(1.0, TOP) as u16
+    }
+}
 pub(super) const SIGMA_FORMAT: &str = "kinoise-correction-sigma/1";
 
 /// Statistics of one image, or why it could not be read.
@@ -221,11 +233,7 @@ impl Rewrite<'_> {
 
     fn write_sigma(&self, target: &Path, depth_m: &[f32], image: &Image) -> Result<()> {
         let sigma = self.correction.uncertainty_m(depth_m, &image.conditions)?;
-        let word = |s: &f32| match f64::from(*s) * SIGMA_UNITS_PER_METRE {
-            units if units.is_nan() => 0,
-            // Zero uncertainty must not read as a missing depth.
-            units => units.round().clamp(1.0, f64::from(u16::MAX)) as u16,
-        };
+        let word = |s: &f32| sigma_word(f64::from(*s));
         let (width, height) = (self.sensor.camera.width, self.sensor.camera.height);
         let frame = Frame { width, height, raw: sigma.iter().map(word).collect() };
         make_folder_of(target)?;

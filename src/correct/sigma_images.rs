@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::correction::{Conditions, Correction};
-use super::recording::SIGMA_UNITS_PER_METRE;
+use super::rewrite::{SIGMA_UNITS_PER_METRE, TOP, sigma_word};
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -31,9 +31,6 @@ pub struct SigmaImages {
     /// Where the model does not match the sequence's sensor, and what sigma lacks.
     pub remarks: Vec<String>,
 }
-
-/// The largest value of an image.
-const TOP: f64 = 65535.0;
 
 /// Writes into `output` 16-bit `sigma/*.png` in units of 10 um ([`SIGMA_UNITS_PER_METRE`]), 0 where there is
 /// no depth; `sigma.txt`, a TUM list of their stamps and paths; and `sigma.json`, which describes the values.
@@ -66,7 +63,7 @@ pub fn sigma_images(
             found.beyond += usize::from(!(near..=far).contains(&f64::from(*z)));
         }
         let camera = &sequence.sensor.camera;
-        let raw = sigma.iter().map(|s| number(*s)).collect();
+        let raw = sigma.iter().map(|s| sigma_word(*s)).collect();
         let frame = Frame { width: camera.width, height: camera.height, raw };
         write_atomic(&folder.join(name), &encode_png16(&frame)?)?;
         progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, sequence.moments.len());
@@ -104,15 +101,6 @@ impl SigmaImages {
             mean_m: self.mean_m + other.mean_m,
             remarks: Vec::new(),
         }
-    }
-}
-
-/// The value of a pixel. A measured pixel never gets the value for no depth.
-fn number(sigma_m: f64) -> u16 {
-    if sigma_m.is_finite() {
-        (sigma_m * SIGMA_UNITS_PER_METRE).round().clamp(1.0, TOP) as u16
-    } else {
-        0
     }
 }
 

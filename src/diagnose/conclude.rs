@@ -26,8 +26,8 @@ use super::views::between::between;
 use super::views::field::Field;
 use super::views::known::KnownTerms;
 use super::views::thinned;
-use crate::effects::KINECT_BASELINE_M;
 use crate::model::{Effect, Form, NoiseModel, Searched};
+use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::{Statistic, Term};
 
 impl Case<'_> {

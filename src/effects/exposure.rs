@@ -6,7 +6,6 @@ use nalgebra::Vector3;
 
 use crate::camera::Rays;
 use crate::scene::Seen;
-use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::corner_radius;
 use crate::view::Sensor;
 
@@ -64,7 +63,7 @@ impl Exposure<'_> {
 
     /// fx * baseline, px m.
     pub fn disparity_px_m(&self) -> f64 {
-        self.sensor.disparity_px_m().unwrap_or(self.sensor.camera.fx * KINECT_BASELINE_M)
+        self.sensor.scale_px_m()
     }
 
     /// Column and row of a pixel.

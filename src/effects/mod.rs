@@ -23,7 +23,6 @@ pub use range_not_depth::RAY_FOR_DEPTH;
 pub use traces::{Bounds, Flat, Inverse, Known, Smallest};
 
 use crate::camera::Camera;
-pub use crate::sensors::KINECT_BASELINE_M;
 pub use crate::terms::ROOM_LUX;
 use crate::terms::{Basis, Statistic, Term};
 use draw::{chance, normals};

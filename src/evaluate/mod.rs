@@ -15,6 +15,8 @@ use nalgebra::{
     Isometry3, Matrix3, Matrix4, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
 };
 
+use serde_json::{Value, json};
+
 use crate::error::{Error, Result};
 use crate::stats::median;
 use crate::trajectory::{Pose, associate};
@@ -95,6 +97,12 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// The figures, their names ending in `suffix`, and the number of pairs.
+    pub fn json(&self, suffix: &str) -> Value {
+        let figures = self.figures().map(|(name, v)| (format!("{name}{suffix}"), json!(v)));
+        figures.into_iter().chain([("pairs".into(), json!(self.pairs))]).collect()
+    }
+
     /// `None` for an empty list.
     pub fn of(errors: &[f64]) -> Option<Self> {
         if errors.is_empty() {

@@ -23,7 +23,7 @@ fn the_scripts_figures_to_the_last_digit() {
         let words: Vec<&str> = line.split([' ', '|']).filter(|w| !w.is_empty()).collect();
         let poses = |kind: &str| {
             let file = folder.join(format!("{}_{kind}.txt", words[0]));
-            read_benchmark(&file).expect("a trajectory").poses
+            read_benchmark(&file).expect("a trajectory")
         };
         let [truth, estimate] = ["groundtruth", words[1]].map(poses);
         let evaluated = |delta| evaluate(&truth, &estimate, delta).expect("they overlap");

@@ -41,7 +41,7 @@ impl UnitModel {
     }
 
     fn refused(&self, what: impl Into<String>, remedy: &'static str) -> Error {
-        Error::ModelFile { path: self.path.clone(), what: what.into(), remedy }
+        Error::recording(&self.path, what, remedy)
     }
 
     fn sensor(&self) -> Result<&RecordingFile> {

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::assumed::Assumed;
 use super::images::size_of;
-use super::layout::{DEPTH_LIST, DESCRIPTION, UnknownKeys, is_view, read_sensor};
+use super::layout::{
+    DEPTH_LIST, DESCRIPTION, DESCRIPTIONS, INDEX, UnknownKeys, is_view, read_sensor,
+};
 use super::list::{FrameList, put_in_order, read_list, shorten};
 use super::output::{entries, listed};
-use super::output_folder::DESCRIPTIONS;
 use super::stills::{Film, Footage};
 use crate::error::{Error, Result};
 use crate::read::{is_there, read_text};
@@ -152,7 +153,6 @@ fn holds_recording(folder: &Path) -> bool {
         || entries(folder).is_ok_and(|files| files.iter().any(|p| is_image(p)))
 }
 
-pub(crate) const INDEX: &str = "INDEX.txt";
 /// Reads INDEX.txt and the depth frames it names.
 pub(super) fn dump(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let index = root.join(INDEX);

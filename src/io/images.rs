@@ -71,7 +71,7 @@ fn sized(
         return Ok(frame);
     }
     let place = within.map_or_else(String::new, |w| format!("{}: ", w.store.place(w.index)));
-    Err(Error::image(
+    Err(Error::recording(
         path,
         format!("{place}the image is {w} x {h} px, the recording's are {width} x {height}"),
         "take the image out, or correct width and height in recording.json",
@@ -103,7 +103,7 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<Frame> {
 }
 
 fn decode_png16(path: &Path, bytes: &[u8]) -> Result<Frame> {
-    png16(bytes).map_err(|(what, remedy)| Error::image(path, what, remedy))
+    png16(bytes).map_err(|(what, remedy)| Error::recording(path, what, remedy))
 }
 
 /// Decodes a 16-bit grey PNG. The error is what is wrong and what to do.
@@ -132,7 +132,8 @@ pub(super) fn png16(bytes: &[u8]) -> Result<Frame, (String, &'static str)> {
 /// Decodes `P5 w h 65535` with little-endian values, contrary to the PGM standard:
 /// fakenect dumps its memory as is.
 fn decode_fakenect_pgm(path: &Path, bytes: &[u8]) -> Result<Frame> {
-    let bad = |what: &str| Error::image(path, what, "expected a fakenect d-*.pgm: P5, size, 65535");
+    let bad =
+        |what: &str| Error::recording(path, what, "expected a fakenect d-*.pgm: P5, size, 65535");
     let (header, data) = pgm_header(bytes).ok_or_else(|| bad("no P5 header"))?;
     let [width, height, top] = header;
     if top != 65535 {

@@ -20,6 +20,9 @@ use crate::view::{
 pub const DESCRIPTION: &str = "recording.json";
 const VIEW_FILE: &str = "view.json";
 pub(crate) const DEPTH_LIST: &str = "depth.txt";
+pub(crate) const INDEX: &str = "INDEX.txt";
+/// Files that make a folder a recording.
+pub(crate) const DESCRIPTIONS: [&str; 3] = [DESCRIPTION, INDEX, DEPTH_LIST];
 const INFRARED_LIST: &str = "ir.txt";
 const REMEDY_JSON: &str = "compare it with the recording layout in the README";
 

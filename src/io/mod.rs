@@ -14,16 +14,15 @@ mod stills;
 mod unfinished;
 
 pub use assumed::Assumed;
-pub(crate) use folder::{INDEX, results_in};
+pub(crate) use folder::results_in;
 pub use images::{FrameSource, encode_pgm16, encode_png16, encode_png16_quickly, encode_rgb};
 pub(crate) use images::{encode_corrected, is_corrected, read_depth, size_of};
-pub(crate) use layout::{DEPTH_LIST, read_description};
+pub(crate) use layout::{DEPTH_LIST, DESCRIPTIONS, INDEX, read_description};
 pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
 pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
 pub(crate) use output::{entries, sync_folder, write_atomic_with};
 pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
-pub(crate) use output_folder::DESCRIPTIONS;
 pub use output_folder::{Leaves, OutputFolder, refuse_inside, refuse_nested, settled};
 pub use pictures::{ColourImage, InfraredImage};
 pub(crate) use unfinished::lock;

@@ -9,8 +9,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::folder::INDEX;
-use super::layout::{DEPTH_LIST, DESCRIPTION};
+use super::layout::DESCRIPTIONS;
 use super::output::{entries, listed, sync_folder, write_atomic};
 use super::unfinished::{Open, UNFINISHED, discard, discard_stale, lock, register, unfinished};
 use crate::error::{Error, Result};
@@ -38,9 +37,6 @@ impl Leaves {
     /// A recording or a sequence.
     pub const RECORDING: Leaves = Leaves::Images { marks: &DESCRIPTIONS };
 }
-
-/// Files that make a folder a recording.
-pub(crate) const DESCRIPTIONS: [&str; 3] = [DESCRIPTION, INDEX, DEPTH_LIST];
 
 /// An output folder in preparation; discarded if dropped before [`OutputFolder::finish`].
 #[derive(Debug)]

@@ -33,7 +33,7 @@ fn decode_of_size(
     [width, height]: [usize; 2],
     remedy: &'static str,
 ) -> Result<image::DynamicImage> {
-    let damaged = |e: image::ImageError| Error::image(path, e.to_string(), remedy);
+    let damaged = |e: image::ImageError| Error::recording(path, e.to_string(), remedy);
     let file = std::io::BufReader::new(open(path)?);
     // Detected from the content: names can be wrong.
     let reader = image::ImageReader::new(file).with_guessed_format();
@@ -42,7 +42,7 @@ fn decode_of_size(
     let (wide, high) = decoder.dimensions();
     if (wide as usize, high as usize) != (width, height) {
         let what = format!("the {kind} image is {wide} x {high} px, the depth {width} x {height}");
-        return Err(Error::image(path, what, remedy));
+        return Err(Error::recording(path, what, remedy));
     }
     image::DynamicImage::from_decoder(decoder).map_err(damaged)
 }
@@ -67,7 +67,7 @@ impl InfraredImage {
             }
             image::DynamicImage::ImageLuma16(grey) => grey.into_raw(),
             other => {
-                return Err(Error::image(
+                return Err(Error::recording(
                     path,
                     format!("{:?} image", other.color()),
                     "infrared must be a grey PNG of 8 or 16 bits",

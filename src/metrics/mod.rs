@@ -19,7 +19,10 @@ use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::FrameSource;
-use crate::measure::{MeasureOptions, ViewMeasurement, Workbench, measure_view, view_target};
+use crate::measure::{
+    MeasureOptions, ViewMeasurement, Workbench, measure_view, ranges_remark, view_target,
+    without_copies,
+};
 use crate::rng::Seed;
 use crate::view::{Excluded, Recording, View};
 use temporal::TemporalNoise;
@@ -59,6 +62,9 @@ pub struct Metrics {
     pub by_distance: Vec<AtDistance>,
     /// Views that cannot be used: name and reason.
     pub excluded: Vec<[String; 2]>,
+    /// On frames that were left out, and on the recording.
+    #[serde(skip)]
+    pub remarks: Vec<String>,
 }
 
 /// Largest tilt of a frontal view; the tool asks for a frontal target, which held by hand is within ten
@@ -74,7 +80,15 @@ const STEP_M: f64 = 0.5;
 pub fn metrics(recording: &Recording, seed: Seed, progress: Progress<'_>) -> Result<Metrics> {
     let options = MeasureOptions { seed, ..MeasureOptions::default() };
     let bench = Workbench::new(&recording.sensor, options);
-    let (views, excluded) = recording.each_view(progress, |view| of_view(view, &bench));
+    let (found, mut excluded) = recording.each_view(progress, |view| of_view(view, &bench));
+    let (mut views, mut measured): (Vec<ViewMetrics>, Vec<ViewMeasurement>) =
+        found.into_iter().unzip();
+    excluded.extend(without_copies(recording, &mut measured));
+    views.retain(|v| measured.iter().any(|m| m.name == v.view));
+    let mut remarks = Vec::from_iter(ranges_remark(recording, &excluded, &bench));
+    for view in &measured {
+        remarks.extend(view.notes.iter().map(|note| format!("view {}: {note}", view.name)));
+    }
     let excluded: Vec<[String; 2]> = excluded.iter().map(named).collect();
     if views.is_empty() {
         let first = excluded
@@ -87,23 +101,23 @@ pub fn metrics(recording: &Recording, seed: Seed, progress: Progress<'_>) -> Res
         ));
     }
     let by_distance = by_distance(&views);
-    Ok(Metrics { views, by_distance, excluded })
+    Ok(Metrics { views, by_distance, excluded, remarks })
 }
 
 fn named(excluded: &Excluded) -> [String; 2] {
     [excluded.view.clone(), excluded.reason.clone()]
 }
 
-fn of_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMetrics> {
+fn of_view(view: &View, bench: &Workbench<'_>) -> Result<(ViewMetrics, ViewMeasurement)> {
     let target = view_target(view, bench)?;
-    let ViewMeasurement { whole, .. } = measure_view(view, bench)?;
+    let measured = measure_view(view, bench)?;
     let camera = &bench.sensor.camera;
     let mut source = FrameSource::new(camera.width, camera.height);
     let reference_distance_m = view.notes.reference_distance_m;
     let mut over_time = TemporalNoise::of(target.pixels.len());
     let mut frames = Vec::new();
     for stored in &view.depth {
-        // An unreadable frame is remarked by the calibration; here it is skipped.
+        // What was measured has a remark on an unreadable frame.
         let Ok(frame) = source.frame(stored) else { continue };
         let code = &bench.sensor.code;
         let raw = target.pixels.iter().map(|&i| frame.raw[i as usize]);
@@ -120,15 +134,17 @@ fn of_view(view: &View, bench: &Workbench<'_>) -> Result<ViewMetrics> {
         what: "no frame of it shows a plane".into(),
         remedy: "record the view again",
     })?;
-    Ok(ViewMetrics {
+    let spread = &measured.whole.spread;
+    let metrics = ViewMetrics {
         view: view.name.clone(),
         mean,
         reference_distance_m,
         temporal_noise: over_time.median_share(&bench.sensor.code),
-        sigma_m: whole.spread.spatial_m,
-        sigma_temporal_m: whole.spread.temporal_m,
+        sigma_m: spread.spatial_m,
+        sigma_temporal_m: spread.temporal_m,
         frames,
-    })
+    };
+    Ok((metrics, measured))
 }
 
 /// The measured points of the target, m.

@@ -153,7 +153,7 @@ impl NoiseModel {
     pub(crate) fn read_unchecked(file: &Path) -> Result<Self> {
         let text = read_json(file)?;
         let path = file.to_path_buf();
-        Self::from_json(&text).map_err(|(what, remedy)| Error::ModelFile { path, what, remedy })
+        Self::from_json(&text).map_err(|(what, remedy)| Error::Recording { path, what, remedy })
     }
 
     fn from_json(text: &str) -> Result<Self, (String, &'static str)> {

@@ -20,7 +20,7 @@ pub fn comparison_page(comparison: &Comparison, origin: &Origin) -> Result<Strin
         h1 { (title) }
         p { "The first four rows are the paper's variants with the parameters of its Table II; those below \
             go past it, one step at a time. Errors are computed as the scripts of the TUM benchmark do." }
-        (section("Figures", &html! { (figure(&paths, &paths.title)?) (beside(&over_time)?) }))
+        (section("Figures", &html! { (figure(&paths, "")?) (beside(&over_time)?) }))
         @for part in tables::tables(comparison) { (section(part.title, &table_of(&part))) }
         @if !comparison.remarks.is_empty() {
             (section("Notes", &list(comparison.remarks.iter().map(|remark| prose(remark)))))

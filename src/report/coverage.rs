@@ -5,7 +5,7 @@ use crate::measure::SigmaRow;
 /// A measured cell covers its neighbourhood up to one step of the paper's grid: 0.5 m from 1 m on, and 10
 /// degrees.
 const STEP_RATIO: f64 = 1.5;
-const STEP_RAD: f64 = 0.174_532_925_199_432_95;
+const STEP_RAD: f64 = 10f64.to_radians();
 
 /// Whether a measured cell is near.
 pub(super) fn is_measured(rows: &[SigmaRow], z_m: f64, theta_rad: f64) -> bool {

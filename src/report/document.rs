@@ -184,18 +184,17 @@ pub fn fold(title: &str, open: bool, content: &Markup) -> Markup {
     html! { details open[open] { summary { (title) } (content) } }
 }
 
-/// A chart with its caption, or without one where the title already says it. It is drawn wide and narrow;
-/// the style sheet shows the one that fits.
+/// A chart with its caption; with an empty one its title is all. It is drawn wide and narrow; the style sheet
+/// shows the one that fits.
 pub fn figure(chart: &Chart, caption: &str) -> Result<Markup> {
     let label = if chart.title.is_empty() { caption } else { &chart.title };
-    let caption = (caption != label || chart.title.is_empty()).then_some(caption);
     let drawing = drawing(chart, label)?;
-    Ok(html! { figure { (drawing) @if let Some(words) = caption { figcaption { (words) } } } })
+    Ok(html! { figure { (drawing) @if !caption.is_empty() { figcaption { (caption) } } } })
 }
 
 /// Charts with their titles, side by side where there is room.
 pub(super) fn beside(charts: &[Chart]) -> Result<Markup> {
-    let figures = charts.iter().map(|chart| figure(chart, &chart.title));
+    let figures = charts.iter().map(|chart| figure(chart, ""));
     let figures = figures.collect::<Result<Vec<Markup>>>()?;
     Ok(html! { div.beside { @for figure in figures { (figure) } } })
 }

@@ -10,6 +10,7 @@ use crate::io::{
 };
 use crate::read::{first_there, is_there, read_text};
 use crate::trajectory::{associate, read_benchmark};
+use crate::units::{counted, verb};
 use crate::view::FrameRef;
 
 /// Largest difference between timestamps of one moment, s (associate.py's `max_difference`).
@@ -31,12 +32,14 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     if moments.len() < before {
         let dropped = before - moments.len();
         remarks.push(format!(
-            "{dropped} depth images have the stamp of the one before; only the first is mapped"
+            "{} {} the stamp of the one before; only the first is mapped",
+            counted(dropped, "depth image"),
+            verb(dropped, "has", "have")
         ));
     }
     let truth = root.join("groundtruth.txt");
     let read = is_there(&truth).and_then(|there| match there {
-        true => read_benchmark(&truth).map(|t| t.poses),
+        true => read_benchmark(&truth),
         false => Ok(Vec::new()),
     });
     let (truth, unused_truth) = match read {

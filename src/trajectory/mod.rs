@@ -66,19 +66,18 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory> {
 /// equal times the last counts.
 /// Fails, naming the line, at a line that is not eight finite numbers or whose quaternion has no length;
 /// also if the file holds no pose.
-pub fn read_benchmark(path: &Path) -> Result<Trajectory> {
+pub fn read_benchmark(path: &Path) -> Result<Vec<Pose>> {
     let mut poses: Vec<Pose> = Vec::new();
     each_line(path, |pose| {
         poses.push(pose);
         Ok(())
     })?;
-    let lines = poses.len();
     // The sort is stable: of equal times the last stays last, and comes first after reversing.
     poses.sort_by(|a, b| a.stamp.total_cmp(&b.stamp));
     poses.reverse();
     poses.dedup_by(|later, kept| later.stamp == kept.stamp);
     poses.reverse();
-    Ok(Trajectory { repeated: lines - poses.len(), poses })
+    Ok(poses)
 }
 
 fn each_line(path: &Path, mut take: impl FnMut(Pose) -> Result<(), Fault>) -> Result<()> {

@@ -3,11 +3,11 @@
 use kinoise::camera::{Camera, Rays};
 use kinoise::correct::Correction;
 use kinoise::diagnose::KnownTerms;
-use kinoise::effects::KINECT_BASELINE_M;
 use kinoise::error::Result;
 use kinoise::model::{Effect, NoiseModel, SigmaModel};
 use kinoise::plane::Plane;
 use kinoise::scene::TargetFrame;
+use kinoise::sensors::KINECT_BASELINE_M;
 use kinoise::terms::{Pixels, Term, edge_distances};
 use kinoise::view::Sensor;
 use nalgebra::Vector3;

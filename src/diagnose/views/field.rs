@@ -9,7 +9,6 @@ use super::known::KnownTerms;
 use crate::camera::Rays;
 use crate::diagnose::edges::Edges;
 use crate::diagnose::steps::lattice::RawHistogram;
-use crate::effects::KINECT_BASELINE_M;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::measure::{ColumnSteps, LeftOut, TargetFrames, Workbench};
@@ -174,7 +173,7 @@ impl Field {
     }
 
     fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {
-        let scale_px_m = sensor.disparity_px_m().unwrap_or(sensor.camera.fx * KINECT_BASELINE_M);
+        let scale_px_m = sensor.scale_px_m();
         let size = [sensor.camera.width, sensor.camera.height];
         Field {
             name: view.name.clone(),

@@ -39,7 +39,7 @@ pub fn camera(
     let (width, height) = size;
     let camera = Camera { width, height, fx, fy, cx, cy, distortion };
     match camera.fault() {
-        Some(fault) => Err(wrong(fault.to_string())),
+        Some(fault) => Err(wrong(fault)),
         None => {
             let said = said.map_or_else(String::new, |said| format!("; {said}"));
             Ok(Some((camera, format!("the camera is what {} says{said}", from.name))))

@@ -108,7 +108,7 @@ impl Bag for Db3 {
         let (_, stored) = fetched(u64::MAX)?;
         let mut bytes = unzstd(&stored, MAX_PIECE).map_err(|why| {
             let what = format!("message {} of {}: {why}", number + 1, self.topics[topic].name);
-            Error::image(&self.path, what, REMEDY)
+            Error::recording(&self.path, what, REMEDY)
         })?;
         let length = bytes.len() as u64;
         bytes.truncate(length.min(limit) as usize);

@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::frame::{DepthCode, Frame};
 use crate::io::assumed::Assumed;
 use crate::io::stills::{Film, Footage};
+use crate::units::{counted, verb};
 use crate::view::{FrameRef, FrameStore, Sensor, Within};
 
 /// Millimetres: the ROS convention for 16UC1 (REP 118).
@@ -161,7 +162,9 @@ impl Survey {
         let shared = order.windows(2).filter(|w| w[0].0 == w[1].0).count();
         if shared > 0 {
             remarks.push(format!(
-                "{topic}: {shared} frames have the same timestamp as another; all are used"
+                "{topic}: {} {} the same timestamp as another; all are used",
+                counted(shared, "frame"),
+                verb(shared, "has", "have")
             ));
         }
         order

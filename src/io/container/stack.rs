@@ -199,7 +199,7 @@ impl Stack {
         let bytes = self.array.body.bytes(length + index as u64 * n, n, &what)?;
         number.pixels(&bytes, self.values_per_metre).map_err(|why| {
             let what = format!("{what}: {why}");
-            Error::image(
+            Error::recording(
                 &self.array.path,
                 what,
                 "save depth as 16-bit integers, or as floats in metres",

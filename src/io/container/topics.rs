@@ -77,7 +77,11 @@ fn encoding(bag: &dyn Bag, topic: usize) -> Result<Result<Encoding, String>> {
 /// Error for one message.
 pub fn damaged(bag: &dyn Bag, topic: usize, number: usize, damage: &str) -> Error {
     let what = format!("{}: {damage}", place(bag, topic, number));
-    Error::image(bag.path(), what, "the message is damaged; copy the file again or record it again")
+    Error::recording(
+        bag.path(),
+        what,
+        "the message is damaged; copy the file again or record it again",
+    )
 }
 
 pub fn place(bag: &dyn Bag, topic: usize, number: usize) -> String {

@@ -10,7 +10,7 @@ use crate::report::numbers::{decimals_for, fixed, significant, with_error};
 const UNITS: [(&str, f64, &str); 7] = [
     ("_mps", 1e3, " mm/s"),
     ("_deg", 1.0, "°"),
-    ("_rad", 57.295_779_513_082_32, "°"),
+    ("_rad", 1f64.to_degrees(), "°"),
     ("_px", 1.0, " px"),
     ("_mm", 1.0, " mm"),
     ("_m", 1.0, " m"),

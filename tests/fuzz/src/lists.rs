@@ -5,7 +5,9 @@ use std::fmt::Write;
 use kinoise::evaluate::{Delta, evaluate};
 use kinoise::io::{Assumed, read_list, write_recording_file};
 use kinoise::sequence::{self, Sequence};
-use kinoise::trajectory::{Pose, Trajectory, read_benchmark, read_trajectory, tum_text};
+use std::path::Path;
+
+use kinoise::trajectory::{Pose, read_benchmark, read_trajectory, tum_text};
 
 use super::desk::{Desk, assumed, check_sensor, frame_png, read, sensor};
 
@@ -84,12 +86,13 @@ pub fn trajectory(data: &[u8]) -> bool {
     DESK.with(|desk| {
         let path = desk.put("poses.txt", data);
         let mut is_one = false;
-        for read in [read_trajectory, read_benchmark] {
-            let Ok(Trajectory { poses, .. }) = read(&path) else { continue };
+        let in_order = |path: &Path| read_trajectory(path).map(|t| t.poses);
+        for read in [in_order, read_benchmark] {
+            let Ok(poses) = read(&path) else { continue };
             is_one = true;
             check_poses(&poses);
             let again = desk.put("again.txt", tum_text(&poses).as_bytes());
-            let again = read_benchmark(&again).expect("what was written is read").poses;
+            let again = read_benchmark(&again).expect("what was written is read");
             // Stamps are written to the microsecond: closer ones become equal.
             if again.len() == poses.len() {
                 for (a, b) in poses.iter().zip(&again) {
