@@ -98,7 +98,7 @@ impl Sensor {
         let nearest_m = fx * baseline_m / width as f64;
         (nearest_m > MAX_NEAREST_M).then(|| {
             format!(
-                "baseline_m = {shown} and fx = {} px let both eyes meet first {nearest_m:.0} m away",
+                "baseline_m = {shown} and fx = {} px: up to {nearest_m:.0} m away the disparity exceeds the image's width",
                 shortest(fx)
             )
         })

@@ -27,10 +27,10 @@ pub struct Tracker<'a> {
     camera: &'a Camera,
     /// The last frame with a pose.
     last: Option<Prepared>,
-    /// Its stamp, s, its pose, and its motion since the one before.
+    /// Its stamp, s, its pose, and its velocity since the one before.
     stamp: f64,
     pose: Isometry3<f64>,
-    motion: Isometry3<f64>,
+    velocity: Velocity,
     /// Its pose from the features of the colour images alone.
     pose_by_colour: Isometry3<f64>,
     /// Share of its points with a neighbour.
@@ -48,7 +48,7 @@ impl<'a> Tracker<'a> {
             last: None,
             stamp: 0.0,
             pose: Isometry3::identity(),
-            motion: Isometry3::identity(),
+            velocity: Velocity::default(),
             pose_by_colour: Isometry3::identity(),
             inlier_ratio: 0.0,
             surfels: Surfels::new(preprocessor.options.max_observations),
@@ -96,7 +96,8 @@ impl<'a> Tracker<'a> {
         let seen = stages.time("start", || self.seen_motion(last, &frame))?;
         let start = seen.unwrap_or(match self.options.init {
             Init::None => Isometry3::identity(),
-            Init::Motion | Init::Orb => self.motion,
+            // Frames may have been lost meanwhile.
+            Init::Motion | Init::Orb => self.velocity.after(report.stamp - self.stamp),
         });
         let mut alignment = self.align(last, &frame, start, stages);
         if self.options.readout_s > 0.0 {
@@ -117,6 +118,8 @@ impl<'a> Tracker<'a> {
             let moved = seen.unwrap_or(alignment.target_from_source);
             self.pose_by_colour = renormalised(&(self.pose_by_colour * moved));
             report.by_colour = seen.and(by_colour(&frame, &self.pose_by_colour));
+            let seconds = report.stamp - self.stamp;
+            self.velocity = Velocity::of(&alignment.target_from_source, seconds);
             self.stamp = report.stamp;
             self.keep(frame, pose, stages);
         }
@@ -188,9 +191,6 @@ impl<'a> Tracker<'a> {
 
     /// Fuses a frame into the map and makes it the last frame.
     fn keep(&mut self, frame: Prepared, pose: Isometry3<f64>, stages: &mut Stages) {
-        if self.last.is_some() {
-            self.motion = renormalised(&(self.pose.inverse() * pose));
-        }
         self.pose = pose;
         stages.time("fuse", || self.fuse(&frame));
         self.last = Some(frame);

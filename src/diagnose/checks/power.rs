@@ -51,7 +51,9 @@ impl DetectionCriteria<'_> {
         let alone = Beside::of(&views, m, self.rules.prior)?.alone(&views);
         let null = Null::of_candidate(&alone, self.rules.prior)?;
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
-        let threshold = self.outcome.noise.threshold(Group::Named, self.rules.level);
+        let beside_others = !self.outcome.chosen.is_empty();
+        let rules = if beside_others { self.rules.later() } else { self.rules };
+        let threshold = self.outcome.noise.threshold(Group::Named, rules.level);
         let need =
             null.gain_for(threshold, alone.len(), &self.rules).max(MIN_SHARE_OF_GAIN * first);
         let u = DVector::from_column_slice(&unit.coefficients);
