@@ -35,6 +35,8 @@ pub struct EdgeLoss {
     /// Sum over the rows of the width that the geometry predicts.
     pub shaded: f64,
     pub rows: f64,
+    /// Readings lost, of how many, where the shadow may be and beyond it; none beside a twin.
+    pub counts: [[f64; 2]; 2],
 }
 
 /// One line's crossing of the edge.

@@ -78,8 +78,16 @@ impl Edges {
                     pixels.filter(lost).count() as f64
                 };
                 let beyond = shadow + fringe_px(field.width);
-                let anyway = lost(beyond..beyond + BEYOND_PX) / BEYOND_PX as f64;
-                self.sides[side].lost += lost(0..shadow) - anyway * shadow as f64;
+                let counts = [[0, shadow], [beyond, beyond + BEYOND_PX]]
+                    .map(|[from, to]| [lost(from..to), (to - from) as f64]);
+                let [[within, width], [anyway, of]] = counts;
+                let sums = &mut self.sides[side];
+                sums.lost += within - anyway / of * width;
+                sums.counts
+                    .as_flattened_mut()
+                    .iter_mut()
+                    .zip(counts.as_flattened())
+                    .for_each(|(sum, n)| *sum += n);
             }
         }
     }

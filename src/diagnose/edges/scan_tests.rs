@@ -201,8 +201,10 @@ fn shadows(width: impl Fn(f64) -> [f64; 2]) -> Vec<Sides> {
     let of = |k: i32| {
         let shaded = 2.0 * f64::from(k);
         let [left, right] = width(shaded).map(f64::round);
-        let side =
-            |lost: f64| Some(EdgeLoss { lost: 100.0 * lost, shaded: 100.0 * shaded, rows: 100.0 });
+        let side = |lost: f64| {
+            let [lost, shaded] = [lost, shaded].map(|px| 100.0 * px);
+            Some(EdgeLoss { lost, shaded, rows: 100.0, ..EdgeLoss::default() })
+        };
         Sides([side(left), side(right)])
     };
     (4..14).map(of).collect()
@@ -230,6 +232,31 @@ fn a_shadow_of_some_views_is_told_with_how_many() {
     assert!(nameless.ends_with(" px, in 3 of 10 views"), "{nameless}");
     let lines = |e: f64| if e > 21.0 { 1.0 } else { 0.0 };
     assert!(band(&shadows(|e| [0.0, lines(e)]), 1e-3).is_none(), "a line is what a border errs by");
+}
+
+/// Twelve views with a few lost readings each, as in a shadow of some thousandths: told where the background
+/// beyond loses none, but not where it loses as many, nor where one view alone loses them.
+#[test]
+fn a_thin_shadow_is_seen_by_the_counts() {
+    let thin = |within: [f64; 12], beyond: f64| {
+        let view = |n: f64| {
+            let left = EdgeLoss {
+                lost: n / 4.0,
+                shaded: 100.0,
+                rows: 60.0,
+                counts: [[n, 400.0], [beyond, 2000.0]],
+            };
+            Sides([Some(left), None])
+        };
+        band(&within.map(view), 1e-3)
+    };
+    let few = [0.0, 1.0, 0.0, 2.0, 1.0, 0.0, 3.0, 0.0, 1.0, 0.0, 3.0, 1.0];
+    let found = thin(few, 0.0).expect("a shadow");
+    assert!(found.lawful && found.of_some.is_none() && found.share[0] < 0.01, "{found:?}");
+    assert!(thin(few, 5.0).is_none(), "as much is lost beyond it");
+    let mut one = [0.0; 12];
+    one[3] = 14.0;
+    assert!(thin(one, 0.0).is_none(), "in one view");
 }
 
 /// Three views are enough for a shadow of several pixels, but not for the border error, nor for one object

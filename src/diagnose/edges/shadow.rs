@@ -49,7 +49,8 @@ impl Sides {
             let own = edges.beside(side)?;
             let Some(twin) = twin else { return Some(own) };
             let expected = twin.beside(side)?;
-            Some(EdgeLoss { lost: own.lost - expected.lost * own.rows / expected.rows, ..own })
+            let lost = own.lost - expected.lost * own.rows / expected.rows;
+            Some(EdgeLoss { lost, counts: Default::default(), ..own })
         };
         Sides([side(0), side(1)])
     }
@@ -126,8 +127,9 @@ fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
     let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
-    // Two sides were tried, and the border error is the second test at this level.
-    let p = (2.0 * lawful.p_above(0.0).min(2.0 * beyond_borders(views))).min(1.0);
+    // Two sides were tried; the border error and the counts are further tests at this level.
+    let others = beyond_borders(views).min(by_counts(views));
+    let p = (2.0 * lawful.p_above(0.0).min(2.0 * others)).min(1.0);
     let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
     let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
     Some(Band {
@@ -156,6 +158,26 @@ fn beyond_borders(views: &[EdgeLoss]) -> f64 {
     let freedom = views.len() as f64 - 1.0 + borders;
     let scatter = (own - cross * cross / square + borders * BORDER_PX.powi(2)) / freedom;
     student_upper(cross / (square * scatter).sqrt(), freedom)
+}
+
+/// P-value of more losses in the shadow than beyond it, as binomial counts. Their dispersion is that of the
+/// views' losses in the shadow about its mean share, as losses come in clumps (McCullagh and Nelder 1989).
+fn by_counts(views: &[EdgeLoss]) -> f64 {
+    let sum = |of: usize, k: usize| views.iter().map(|v| v.counts[of][k]).sum::<f64>();
+    let [[within, seen], [beyond, others]] = [0, 1].map(|of| [sum(of, 0), sum(of, 1)]);
+    let (lost, all) = (within + beyond, seen + others);
+    if within * others <= beyond * seen {
+        return 1.0;
+    }
+    let term = |k: f64, expected: f64| if k > 0.0 { k * (k / expected).ln() } else { 0.0 };
+    let deviance = 2.0 * (term(within, lost * seen / all) + term(beyond, lost * others / all));
+    let freedom = views.len() as f64 - 1.0;
+    let off = |v: &EdgeLoss| {
+        let expected = within * v.counts[0][1] / seen;
+        (v.counts[0][0] - expected).powi(2) / expected
+    };
+    let dispersion = views.iter().map(off).sum::<f64>() / freedom;
+    student_upper((deviance / dispersion.max(1.0)).sqrt(), freedom)
 }
 
 fn curve(views: &[EdgeLoss], share: f64) -> Curve {
