@@ -102,3 +102,22 @@ fn bent(camera: &Camera, orders: usize) -> Basis {
     let times = Modulation::RadialSlope { fx: camera.fx, fy: camera.fy };
     Basis::powers(Coordinate::RaySquared, orders, times)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With k1 = -0.2 no ray is imaged beyond 0.861.
+    #[test]
+    fn beyond_the_fold_of_a_lens_there_is_no_ray() {
+        for angle in [0.0f64, 0.7, 2.0] {
+            let at = |r: f64| undistorted((r * angle.cos(), r * angle.sin()), -0.2);
+            let (x, y) = at(0.69);
+            let r2 = x * x + y * y;
+            assert!((r2.sqrt() * (1.0 - 0.2 * r2) - 0.69).abs() < 1e-6, "{x} {y}");
+            for r in [0.9, 1.0, 1.08, 1.3] {
+                assert!(at(r).0.is_nan(), "{r}: {:?}", at(r));
+            }
+        }
+    }
+}

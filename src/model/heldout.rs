@@ -115,3 +115,33 @@ fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
     groups.iter_mut().for_each(|group| *group = *group * count / distances);
     views.into_iter().zip(groups).map(|((view, _), fold)| (view, fold)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::SigmaRow;
+
+    /// `tilts` views at each of `distances` distances.
+    fn table(distances: usize, tilts: usize) -> SigmaTable {
+        let row = |view: usize| SigmaRow {
+            z_m: 1.0 + 0.5 * (view / tilts) as f64,
+            theta_rad: 0.1 * (view % tilts) as f64,
+            sigma_m: 0.01,
+            n_effective: None,
+            view,
+        };
+        SigmaTable { rows: (0..distances * tilts).map(row).collect() }
+    }
+
+    #[test]
+    fn a_distance_is_left_out_whole() {
+        for (distances, expected) in [(3, 3), (8, 8), (9, 8), (13, 8)] {
+            let folds = folds(&table(distances, 7));
+            for views in folds.chunks(7) {
+                assert!(views.iter().all(|(_, fold)| *fold == views[0].1), "{views:?}");
+            }
+            assert_eq!(folds.iter().map(|f| f.1).max(), Some(expected - 1));
+        }
+        assert!(folds(&table(2, 7)).is_empty() && held_out(&table(2, 7), Form::Paper).is_none());
+    }
+}

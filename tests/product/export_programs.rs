@@ -50,6 +50,12 @@ fn raw_sensor() -> Sensor {
     Sensor { code, ..sensor() }
 }
 
+/// Raw disparities of more than a Kinect's 11 bits.
+fn fine_sensor() -> Sensor {
+    let code = DepthCode::Disparity { offset: 0.01, slope: 1e-4, invalid: 0 };
+    Sensor { code, ..sensor() }
+}
+
 pub fn model(sensor: &Sensor, effects: Vec<Effect>) -> NoiseModel {
     NoiseModel {
         sensor: Some(RecordingFile::of(sensor)),
@@ -136,6 +142,7 @@ pub fn models() -> Vec<(&'static str, NoiseModel)> {
         ("all variances", model(&sensor(), vec![shaped(Statistic::Variance, bases(), 0.05)])),
         ("formulas", model(&sensor(), formulas())),
         ("raw disparities", model(&raw_sensor(), biases())),
+        ("fine raw disparities", model(&fine_sensor(), biases())),
         (HELD, model(&sensor(), vec![learnt(shaped(Statistic::Bias, bases(), 0.01))])),
         ("plain", model(&kinect_v1(8), Vec::new())),
     ];

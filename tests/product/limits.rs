@@ -299,6 +299,14 @@ fn what_does_not_fit_together_is_named() {
     ] {
         desk.refused(line, &[name, "64 x 48 px"]);
     }
+    let text = std::fs::read_to_string(desk.at("one/recording.json")).expect("a recording");
+    let mut described: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let described = described.as_object_mut().expect("an object");
+    described.remove("units_per_metre");
+    described.insert("raw_disparity".into(), json!({"offset": 3.33, "slope": -0.00307}));
+    described.insert("invalid".into(), json!(0));
+    std::fs::write(desk.at("one/recording.json"), json!(described).to_string()).expect("written");
+    desk.refused("calibrate one -o out", &["within raw_disparity"]);
 }
 
 /// Regression test: messages named this program's types, and numbers with rounding errors of sums.

@@ -267,6 +267,15 @@ fn an_unknown_lens_shows_away_from_the_reference_only() {
     assert!(there.abs() < 0.02 && near > 0.1 && far > 0.03, "{there} {near} {far}");
 }
 
+/// At 525 px a corner's ray is at 0.76, and a lens of k1 = -0.3 folds the image at 0.70.
+#[test]
+fn a_lens_that_folds_the_image_is_refused() {
+    let sensor = kinoise::simulate::room::Film::kinect(1);
+    let made = SpeckleSensor::new(&sensor, causes(&["lens_k1=-0.3"]));
+    let error = made.err().expect("a refusal").to_string();
+    assert!(error.starts_with("lens_k1 = -0.3") && error.contains("smaller"), "{error}");
+}
+
 fn small_shoot(frames: usize, shrink: usize, causes: Causes) -> Shoot {
     let poses = common::grid(&[1.0, 1.5, 2.0], &[0.0, 30.0]).views();
     Shoot {

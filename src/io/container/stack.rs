@@ -245,17 +245,19 @@ fn film(array: Array, beside: Beside, assumed: &Assumed) -> Result<(Footage, Sen
             format!("its {count} images do not have as many timestamps in seconds, in order");
         return Err(array.wrong(what, "save one a frame, in seconds"));
     }
-    if let (None, Some([fx, fy, cx, cy])) = (assumed.intrinsics, beside.intrinsics) {
-        let camera = Camera { width, height, fx, fy, cx, cy, distortion: None };
-        if let Some(fault) = camera.fault() {
-            return Err(Error::recording(&path, format!("its intrinsics: {fault}"), REMEDY_K));
-        }
+    let own_camera = beside.intrinsics.filter(|_| assumed.intrinsics.is_none());
+    let own_camera = own_camera.and_then(|[fx, fy, cx, cy]| {
+        Camera { width, height, fx, fy, cx, cy, distortion: None }.fault()
+    });
+    if let Some(fault) = own_camera {
+        return Err(Error::recording(&path, format!("its intrinsics: {fault}"), REMEDY_K));
     }
-    if let (None, Some(units_per_metre)) = (assumed.code, beside.units_per_metre) {
-        if let Some(fault) = (DepthCode::Metric { units_per_metre, invalid: 0 }).fault() {
-            const REMEDY: &str = "correct it, or leave it out and give --units-per-metre";
-            return Err(Error::recording(&path, fault, REMEDY));
-        }
+    let own_units = beside.units_per_metre.filter(|_| assumed.code.is_none());
+    let own_units = own_units
+        .and_then(|units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 }.fault());
+    if let Some(fault) = own_units {
+        const REMEDY: &str = "correct it, or leave it out and give --units-per-metre";
+        return Err(Error::recording(&path, fault, REMEDY));
     }
     let given = Assumed {
         intrinsics: assumed.intrinsics.or(beside.intrinsics),

@@ -127,6 +127,8 @@ fn the_uncertainty_of_a_correction_is_its_covariance() {
     let about: Value =
         serde_json::from_slice(&fs::read(sigma.join("sigma.json")).expect("read")).expect("json");
     assert_eq!(about["units_per_metre"], json!(SIGMA_UNITS_PER_METRE));
+    let forced = ["--sigma", sigma.to_str().expect("a path"), "--force"];
+    files.correct(&recording, &forced);
     let words =
         FrameSource::new(160, 120).read(&sigma.join("0001/depth/0000.png")).expect("read").raw;
     assert!(words[0] > 20 && words[60 * 160 + 80] < 5, "{} {}", words[0], words[60 * 160 + 80]);
