@@ -34,8 +34,8 @@ impl Camera {
         Camera { width, height, fx: focal_px, fy: focal_px, cx, cy, distortion: None }
     }
 
-    /// What is wrong with these numbers, if anything; begins with the wrong key, by which its line in the file
-    /// is found. With a lens model every pixel is checked.
+    /// What is wrong with these numbers, if anything; where it begins with a key, that key's line in the file
+    /// is named. With a lens model every pixel is checked.
     pub fn fault(&self) -> Option<String> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let Camera { width, height, fx, fy, cx, cy, distortion } = *self;

@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use kinoise::correct::{CorrectOptions, Corrected, correct_recording};
+use kinoise::correct::{CorrectOptions, Corrected, correct_recording, is_uncertainty};
 use kinoise::io::{DESCRIPTION, Leaves, OutputFolder, refuse_nested};
 use kinoise::units::counted;
 use kinoise::{DepthCode, NoiseModel};
@@ -47,7 +47,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }
     let output = new(&arguments.output, Leaves::RECORDING)?;
     let sigma = arguments.sigma.as_deref();
-    let uncertainty = sigma.map(|place| new(place, UNCERTAINTY)).transpose()?;
+    let leaves = |place| if is_uncertainty(place) { UNCERTAINTY } else { Leaves::RECORDING };
+    let uncertainty = sigma.map(|place| new(place, leaves(place))).transpose()?;
     let corrected = working("correcting", |step| {
         let sigma = uncertainty.as_ref().map(OutputFolder::path);
         let options = CorrectOptions { keep_code: arguments.keep_code, sigma };

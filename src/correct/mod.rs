@@ -20,5 +20,7 @@ mod uncertainty;
 
 pub(crate) use correction::Drift;
 pub use correction::{Conditions, Correction};
-pub use recording::{CorrectOptions, Corrected, SIGMA_UNITS_PER_METRE, correct_recording};
+pub use recording::{
+    CorrectOptions, Corrected, SIGMA_UNITS_PER_METRE, correct_recording, is_uncertainty,
+};
 pub use sigma_images::{SigmaImages, sigma_images};

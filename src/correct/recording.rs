@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::correction::Correction;
 use super::raw::{RawCode, metric};
-pub use super::rewrite::{Corrected, SIGMA_UNITS_PER_METRE};
+pub use super::rewrite::{Corrected, SIGMA_UNITS_PER_METRE, is_uncertainty};
 use super::rewrite::{Image, Rewrite, SIGMA_FORMAT, images};
 use crate::Progress;
 use crate::error::{Error, Result};

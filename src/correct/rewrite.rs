@@ -113,6 +113,11 @@ pub(super) fn sigma_word(sigma_m: f64) -> u16 {
 }
 pub(super) const SIGMA_FORMAT: &str = "kinoise-correction-sigma/1";
 
+/// Whether the folder holds uncertainties of an earlier correction.
+pub fn is_uncertainty(folder: &Path) -> bool {
+    std::fs::read_to_string(folder.join("sigma.json")).is_ok_and(|s| s.contains(SIGMA_FORMAT))
+}
+
 /// Statistics of one image, or why it could not be read.
 #[derive(Default)]
 struct Tally {

@@ -150,7 +150,7 @@ pub enum Method {
 pub enum Init {
     /// The pose of the last frame.
     None,
-    /// Constant velocity: the motion between the last two frames.
+    /// Constant velocity: that between the last two frames with a pose.
     Motion,
     /// The motion by ORB features.
     Orb,

@@ -30,8 +30,8 @@ impl Velocity {
         }
     }
 
-    /// Motion of the camera after `seconds`. In the tens of milliseconds of a readout the path is
-    /// straight to a hundredth.
+    /// Motion of the camera after `seconds`, on a straight path: to a hundredth in the tens of milliseconds of
+    /// a readout.
     pub fn after(&self, seconds: f64) -> Isometry3<f64> {
         Isometry3::new(self.shift * seconds, self.turn * seconds)
     }

@@ -27,10 +27,10 @@ pub struct Tracker<'a> {
     camera: &'a Camera,
     /// The last frame with a pose.
     last: Option<Prepared>,
-    /// Its stamp, s, its pose, and its velocity since the one before.
+    /// Its stamp, s, its pose, and its motion and time, s, since the one before.
     stamp: f64,
     pose: Isometry3<f64>,
-    velocity: Velocity,
+    motion: (Isometry3<f64>, f64),
     /// Its pose from the features of the colour images alone.
     pose_by_colour: Isometry3<f64>,
     /// Share of its points with a neighbour.
@@ -48,7 +48,7 @@ impl<'a> Tracker<'a> {
             last: None,
             stamp: 0.0,
             pose: Isometry3::identity(),
-            velocity: Velocity::default(),
+            motion: (Isometry3::identity(), 0.0),
             pose_by_colour: Isometry3::identity(),
             inlier_ratio: 0.0,
             surfels: Surfels::new(preprocessor.options.max_observations),
@@ -96,8 +96,7 @@ impl<'a> Tracker<'a> {
         let seen = stages.time("start", || self.seen_motion(last, &frame))?;
         let start = seen.unwrap_or(match self.options.init {
             Init::None => Isometry3::identity(),
-            // Frames may have been lost meanwhile.
-            Init::Motion | Init::Orb => self.velocity.after(report.stamp - self.stamp),
+            Init::Motion | Init::Orb => self.motion_by(report.stamp),
         });
         let mut alignment = self.align(last, &frame, start, stages);
         if self.options.readout_s > 0.0 {
@@ -118,13 +117,21 @@ impl<'a> Tracker<'a> {
             let moved = seen.unwrap_or(alignment.target_from_source);
             self.pose_by_colour = renormalised(&(self.pose_by_colour * moved));
             report.by_colour = seen.and(by_colour(&frame, &self.pose_by_colour));
-            let seconds = report.stamp - self.stamp;
-            self.velocity = Velocity::of(&alignment.target_from_source, seconds);
+            self.motion = (alignment.target_from_source, report.stamp - self.stamp);
             self.stamp = report.stamp;
             self.keep(frame, pose, stages);
         }
         report.alignment = Some(alignment);
         Ok(())
+    }
+
+    /// Motion since the last frame with a pose, by its velocity; over a longer gap than a few of its intervals
+    /// nobody knows it.
+    fn motion_by(&self, stamp: f64) -> Isometry3<f64> {
+        const MAX_INTERVALS: f64 = 3.0;
+        let (motion, seconds) = &self.motion;
+        let since = (stamp - self.stamp).min(MAX_INTERVALS * seconds);
+        Velocity::of(motion, *seconds).after(since)
     }
 
     /// Pose of this frame in the last one, from features of their colour images, if requested.

@@ -63,7 +63,6 @@ pub struct Metrics {
     /// Views that cannot be used: name and reason.
     pub excluded: Vec<[String; 2]>,
     /// On frames that were left out, and on the recording.
-    #[serde(skip)]
     pub remarks: Vec<String>,
 }
 

@@ -100,20 +100,32 @@ fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
         })
         .collect();
     views.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut group = 0;
-    let mut groups: Vec<usize> = Vec::new();
-    for (i, view) in views.iter().enumerate() {
-        if i > 0 && view.1 > views[i - 1].1 * DISTANCE_RATIO {
-            group += 1;
+    // A distance is all that lies within the ratio of its nearest view.
+    let (mut nearest, mut distances) = (0.0, Vec::<Vec<usize>>::new());
+    for (view, z) in views {
+        if z > nearest * DISTANCE_RATIO {
+            nearest = z;
+            distances.push(Vec::new());
         }
-        groups.push(group);
+        distances.last_mut().into_iter().for_each(|d| d.push(view));
     }
-    if group < 2 {
+    let total: usize = distances.iter().map(Vec::len).sum();
+    let (mut folds, mut before, mut last) = (Vec::<Vec<usize>>::new(), 0, None);
+    for (k, distance) in distances.iter().enumerate() {
+        // Of more distances, those share a fold whose middle views lie in one of as many equal parts.
+        let middle = (2 * before + distance.len()) * MAX_FOLDS / (2 * total);
+        let part = Some(if distances.len() > MAX_FOLDS { middle } else { k });
+        if part != last {
+            folds.push(Vec::new());
+        }
+        folds.last_mut().into_iter().for_each(|f| f.extend(distance));
+        (before, last) = (before + distance.len(), part);
+    }
+    if folds.len() < 3 {
         return Vec::new();
     }
-    let (distances, count) = (group + 1, MAX_FOLDS.min(group + 1));
-    groups.iter_mut().for_each(|group| *group = *group * count / distances);
-    views.into_iter().zip(groups).map(|((view, _), fold)| (view, fold)).collect()
+    let of = |(k, views): (usize, Vec<usize>)| views.into_iter().map(move |view| (view, k));
+    folds.into_iter().enumerate().flat_map(of).collect()
 }
 
 #[cfg(test)]
@@ -143,5 +155,16 @@ mod tests {
             assert_eq!(folds.iter().map(|f| f.1).max(), Some(expected - 1));
         }
         assert!(folds(&table(2, 7)).is_empty() && held_out(&table(2, 7), Form::Paper).is_none());
+    }
+
+    /// Steps of 5 cm from 0.5 to 4 m are, beyond 1 m, within the ratio of one another.
+    #[test]
+    fn close_distances_are_parted() {
+        let mut close = table(71, 1);
+        close.rows.iter_mut().for_each(|r| r.z_m = 0.5 + 0.05 * r.view as f64);
+        let folds = folds(&close);
+        let sizes: Vec<usize> =
+            (0..MAX_FOLDS).map(|k| folds.iter().filter(|f| f.1 == k).count()).collect();
+        assert!(sizes.iter().all(|n| (5..=13).contains(n)), "{sizes:?}");
     }
 }

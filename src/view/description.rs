@@ -73,7 +73,7 @@ impl RecordingFile {
                 DepthCode::Metric { units_per_metre, invalid: self.invalid.unwrap_or(0) }
             }
             (None, Some(RawDisparity { offset, slope, invalid })) => {
-                if self.invalid.is_some() {
+                if self.invalid.is_some_and(|given| given != invalid) {
                     return Err("invalid of raw disparities stands within raw_disparity".into());
                 }
                 DepthCode::Disparity { offset, slope, invalid }

@@ -44,6 +44,8 @@ pub struct EdgeLoss {
 struct Crossing {
     /// Index of the last pixel on the target.
     last: isize,
+    /// Whether the pixel beside it, lost alone in the first frame, may be the target's.
+    is_doubtful: bool,
     /// Index step from one pixel to the next, outwards.
     stride: isize,
     /// Disparity of the background less that of the plane, px.

@@ -78,7 +78,7 @@ impl Edges {
                     pixels.filter(lost).count() as f64
                 };
                 let beyond = shadow + fringe_px(field.width);
-                let counts = [[0, shadow], [beyond, beyond + BEYOND_PX]]
+                let counts = [[usize::from(c.is_doubtful), shadow], [beyond, beyond + BEYOND_PX]]
                     .map(|[from, to]| [lost(from..to), (to - from) as f64]);
                 let [[within, width], [anyway, of]] = counts;
                 let sums = &mut self.sides[side];
@@ -158,7 +158,9 @@ impl EdgeScan<'_> {
             _ => None,
         };
         let side = side.filter(|_| at(room).is_some() && (1..=room).all(|n| off(n).is_some()));
-        Some(Crossing { last: at(last)?, stride, step, inside, side })
+        let is_lost = |n: isize| at(last + n).is_some_and(|i| !disparity(i).is_finite());
+        let is_doubtful = is_lost(1) && !is_lost(2);
+        Some(Crossing { last: at(last)?, is_doubtful, stride, step, inside, side })
     }
 
     fn plane(&self, i: isize) -> f64 {

@@ -8,6 +8,7 @@ use crate::camera::Camera;
 use crate::diagnose::edges::EdgeLoss;
 use crate::diagnose::edges::mixing::mixing;
 use crate::diagnose::edges::shadow::{Band, Sides, band};
+use crate::diagnose::missing::LEVEL;
 use crate::diagnose::missing::report::shadow_finding;
 use crate::frame::DepthCode;
 use crate::plane::Plane;
@@ -117,7 +118,7 @@ fn without_anything_behind_there_is_no_edge() {
 #[test]
 fn a_hundredth_of_the_step_is_seen_and_sized() {
     let mixed = |inside: isize, _: &mut Stream| Some(if inside == 0 { 0.01 } else { 0.0 });
-    let found = mixing(&views(3, &mixed), None, 1e-3).expect("a mixed edge");
+    let found = mixing(&views(3, &mixed), None, LEVEL).expect("a mixed edge");
     assert_eq!(found.families, ["edge-mixing"]);
     let width = &found.parameters["width_px"];
     let [value, error] = ["value", "std_error"].map(|k| width[k].as_f64().unwrap());
@@ -133,7 +134,7 @@ fn a_full_footprint_is_given_its_width() {
         let distance = if inside >= 0 { inside as f64 } else { -1.0 - inside as f64 } + 0.5;
         Some(0.5 * (1.0 - distance / 4.0).max(0.0))
     };
-    let found = mixing(&views(4, &mixed), None, 1e-3).expect("a mixed edge");
+    let found = mixing(&views(4, &mixed), None, LEVEL).expect("a mixed edge");
     let width = found.parameters["width_px"]["value"].as_f64().unwrap();
     assert!((width - 4.0).abs() < 0.2, "{width}");
 }
@@ -165,8 +166,8 @@ fn gross_errors_beside_the_edge_are_no_mixing() {
 fn what_the_twin_has_too_is_no_news() {
     let mixed = |inside: isize, _: &mut Stream| Some(if inside == 0 { 0.05 } else { 0.0 });
     let (real, twin) = (views(5, &mixed), views(6, &mixed));
-    assert!(mixing(&real, None, 1e-3).is_some());
-    assert!(mixing(&real, Some(&twin), 1e-3).is_none());
+    assert!(mixing(&real, None, LEVEL).is_some());
+    assert!(mixing(&real, Some(&twin), LEVEL).is_none());
 }
 
 /// A pixel beside the board is lost once in 50 times.
@@ -185,7 +186,7 @@ fn a_shadow_that_loses_one_reading_in_fifty_is_seen() {
             field(&camera, z, &mut rng, &dark)
         })
         .collect();
-    let found = band(&sides(&fields), 1e-3).expect("a shadow");
+    let found = band(&sides(&fields), LEVEL).expect("a shadow");
     assert!(found.lawful && found.side == 0, "{found:?}");
     let [share, error] = found.share;
     assert!((share - 0.02).abs() < 4.0 * error && error < 0.004, "{share} +- {error}");
@@ -194,7 +195,7 @@ fn a_shadow_that_loses_one_reading_in_fifty_is_seen() {
 #[test]
 fn losses_on_both_sides_or_everywhere_are_no_shadow() {
     let anywhere = |_: isize, rng: &mut Stream| (rng.random::<f64>() > 0.05).then_some(0.0);
-    assert!(band(&sides(&views(8, &anywhere)), 1e-3).is_none());
+    assert!(band(&sides(&views(8, &anywhere)), LEVEL).is_none());
 }
 
 fn shadows(width: impl Fn(f64) -> [f64; 2]) -> Vec<Sides> {
@@ -203,7 +204,8 @@ fn shadows(width: impl Fn(f64) -> [f64; 2]) -> Vec<Sides> {
         let [left, right] = width(shaded).map(f64::round);
         let side = |lost: f64| {
             let [lost, shaded] = [lost, shaded].map(|px| 100.0 * px);
-            Some(EdgeLoss { lost, shaded, rows: 100.0, ..EdgeLoss::default() })
+            let counts = [[4.0 * lost, 4.0 * shaded], [0.0, 3200.0]];
+            Some(EdgeLoss { lost, shaded, rows: 100.0, counts })
         };
         Sides([side(left), side(right)])
     };
@@ -212,26 +214,29 @@ fn shadows(width: impl Fn(f64) -> [f64; 2]) -> Vec<Sides> {
 
 #[test]
 fn a_band_is_a_shadow_when_it_is_on_one_side_and_as_wide_as_it_must_be() {
-    let found = band(&shadows(|e| [0.9 * e, 0.0]), 1e-3).unwrap();
+    let found = band(&shadows(|e| [0.9 * e, 0.0]), LEVEL).unwrap();
     assert!(found.lawful && found.side == 0 && (found.share[0] - 0.9).abs() < 0.05);
-    assert_eq!(band(&shadows(|e| [0.0, e]), 1e-3).unwrap().side, 1);
-    assert!(!band(&shadows(|e| [e, 0.9 * e]), 1e-3).unwrap().lawful, "on both sides");
-    assert!(!band(&shadows(|e| [0.0, 3.0 * e]), 1e-3).unwrap().lawful, "too wide");
-    assert!(band(&shadows(|_| [0.0, 0.0]), 1e-3).is_none());
-    assert!(band(&shadows(|e| [f64::from(e > 25.0), 0.0]), 1e-3).is_none(), "a stray pixel");
+    assert_eq!(band(&shadows(|e| [0.0, e]), LEVEL).unwrap().side, 1);
+    assert!(!band(&shadows(|e| [e, 0.9 * e]), LEVEL).unwrap().lawful, "on both sides");
+    assert!(!band(&shadows(|e| [0.0, 3.0 * e]), LEVEL).unwrap().lawful, "too wide");
+    assert!(band(&shadows(|_| [0.0, 0.0]), LEVEL).is_none());
+    assert!(band(&shadows(|e| [f64::from(e > 25.0), 0.0]), LEVEL).is_none(), "a stray pixel");
 }
 
 /// The last three of ten views lose on the right what the geometry predicts; one pixel each would be no shadow.
 #[test]
 fn a_shadow_of_some_views_is_told_with_how_many() {
     let last = |e: f64| if e > 21.0 { 0.9 * e } else { 0.0 };
-    let found = band(&shadows(|e| [0.0, last(e)]), 1e-3).expect("a shadow");
+    let found = band(&shadows(|e| [0.0, last(e)]), LEVEL).expect("a shadow");
     assert_eq!((found.of_some, found.side), (Some([3, 10]), 1));
     assert!(found.lawful && (found.share[0] - 0.9).abs() < 0.05, "{found:?}");
     let nameless = shadow_finding(Band { lawful: false, ..found }, &[]).shape.expect("a shape");
     assert!(nameless.ends_with(" px, in 3 of 10 views"), "{nameless}");
     let lines = |e: f64| if e > 21.0 { 1.0 } else { 0.0 };
-    assert!(band(&shadows(|e| [0.0, lines(e)]), 1e-3).is_none(), "a line is what a border errs by");
+    assert!(
+        band(&shadows(|e| [0.0, lines(e)]), LEVEL).is_none(),
+        "a line is what a border errs by"
+    );
 }
 
 /// Twelve views with a few lost readings each, as in a shadow of some thousandths: told where the background
@@ -248,7 +253,7 @@ fn a_thin_shadow_is_seen_by_the_counts() {
             };
             Sides([Some(left), None])
         };
-        band(&within.map(view), 1e-3)
+        band(&within.map(view), LEVEL)
     };
     let few = [0.0, 1.0, 0.0, 2.0, 1.0, 0.0, 3.0, 0.0, 1.0, 0.0, 3.0, 1.0];
     let found = thin(few, 0.0).expect("a shadow");
@@ -265,7 +270,7 @@ fn a_thin_shadow_is_seen_by_the_counts() {
 fn a_shadow_of_three_views_is_seen() {
     let of_three = |width: &dyn Fn(f64) -> f64| {
         let views = shadows(|e| [width(e), 0.0]);
-        band(&views[..3], 1e-3)
+        band(&views[..3], LEVEL)
     };
     let found = of_three(&|e| 0.7 * e).expect("6, 7 and 8 px");
     assert!(found.lawful && found.of_some.is_none() && (found.share[0] - 0.7).abs() < 0.05);
@@ -286,7 +291,7 @@ fn mixing_of_some_views_is_told_with_how_many() {
     let mut some = views(22, &mixed);
     some.truncate(4);
     all.extend(some);
-    let found = mixing(&all, None, 1e-3).expect("mixing");
+    let found = mixing(&all, None, LEVEL).expect("mixing");
     assert!(found.families == ["edge-mixing"]);
     let words = found.words.unwrap();
     assert!(found.of_some == Some([4, 14]) && words.ends_with("in 4 of 14 views"), "{words}");

@@ -35,6 +35,9 @@ const OTHER_SIDE: f64 = 0.4;
 const WIDEST: f64 = 1.4;
 /// Standard error of one view's border, px; its rows err together.
 const BORDER_PX: f64 = 0.7;
+/// Shares of the level on each of the two sides: for the views' agreement on a share of the width; for what
+/// exceeds the border error, in all views or in some; for the counts.
+const SHARES: [f64; 3] = [1.0 / 12.0, 1.0 / 24.0, 0.25];
 /// Share of the best curve's gain that a name must reach.
 const SHADOW_ADEQUATE: f64 = 0.6;
 
@@ -107,8 +110,7 @@ fn shaded_views(views: &[Sides], side: usize) -> Option<Band> {
     let widths: Vec<f64> = seen.iter().map(|(_, v)| v.lost / v.rows).collect();
     let some = SomeViews::beyond(&widths, BORDER_PX, OF_A_CONSTANT)?;
     let shaded: Vec<Sides> = some.which.iter().map(|&v| seen[v].0).collect();
-    // Two sides, and the second test at this level.
-    let p = (4.0 * some.p).min(1.0);
+    let p = (some.p / SHARES[1]).min(1.0);
     let of_some = Some([shaded.len(), seen.len()]);
     Some(Band { p, of_some, ..band_on(&shaded, side)? })
 }
@@ -127,9 +129,8 @@ fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
     let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
-    // Two sides were tried; the border error and the counts are further tests at this level.
-    let others = beyond_borders(views).min(by_counts(views));
-    let p = (2.0 * lawful.p_above(0.0).min(2.0 * others)).min(1.0);
+    let p = [lawful.p_above(0.0), beyond_borders(views), by_counts(views)];
+    let p = p.iter().zip(SHARES).map(|(p, share)| p / share).fold(1.0, f64::min);
     let one_sided = share(1 - side) < OTHER_SIDE * lawful.value;
     let gain = [nats(&lawful, views, |v| v.shaded), nats(&even, views, |v| v.rows)];
     Some(Band {
@@ -160,9 +161,13 @@ fn beyond_borders(views: &[EdgeLoss]) -> f64 {
     student_upper(cross / (square * scatter).sqrt(), freedom)
 }
 
-/// P-value of more losses in the shadow than beyond it, as binomial counts. Their dispersion is that of the
-/// views' losses in the shadow about its mean share, as losses come in clumps (McCullagh and Nelder 1989).
+/// P-value of where the lost readings lie, in the shadow or beyond it, given their number. The dispersion is
+/// that of the views' losses in the shadow about their mean share, as losses come in clumps (McCullagh and
+/// Nelder 1989). For shadows too thin to be an error of a border, which is whole pixels.
 fn by_counts(views: &[EdgeLoss]) -> f64 {
+    if views.iter().any(|v| v.lost > 0.5 * BORDER_PX * v.rows) {
+        return 1.0;
+    }
     let sum = |of: usize, k: usize| views.iter().map(|v| v.counts[of][k]).sum::<f64>();
     let [[within, seen], [beyond, others]] = [0, 1].map(|of| [sum(of, 0), sum(of, 1)]);
     let (lost, all) = (within + beyond, seen + others);

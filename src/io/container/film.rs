@@ -197,7 +197,8 @@ fn sensor(
             remarks.push(format!("{topic}: {said}"));
             let [fx, fy, cx, cy] = [camera.fx, camera.fy, camera.cx, camera.cy];
             let known = Assumed { intrinsics: Some([fx, fy, cx, cy]), ..given };
-            let mut sensor = known.sensor(&name, survey.size, [fx, fy, cx, cy], code)?;
+            let sensor = known.sensor(&name, survey.size, [fx, fy, cx, cy], code);
+            let mut sensor = sensor.map_err(|e| e.of(bag.path()))?;
             sensor.camera = camera;
             sensor
         }
@@ -208,7 +209,10 @@ fn sensor(
                 "give --intrinsics fx,fy,cx,cy in pixels, or --sensor",
             ));
         }
-        None => given.sensor(&name, survey.size, [0.0; 4], code)?,
+        None => {
+            let sensor = given.sensor(&name, survey.size, [0.0; 4], code);
+            sensor.map_err(|e| e.of(bag.path()))?
+        }
     };
     sensor.serial = device.serial;
     match sensor.fault() {

@@ -28,10 +28,23 @@ pub struct Number {
 pub const MAX_HEADER: u64 = 16 << 10;
 const MAGIC: &[u8] = b"\x93NUMPY";
 
+/// What is wrong with a header.
+#[derive(Debug)]
+pub enum Fault {
+    /// The array is whole, but its numbers are of a kind that no depth image has; how many dimensions.
+    Numbers(String, usize),
+    Other(String),
+}
+
+impl<S: Into<String>> From<S> for Fault {
+    fn from(what: S) -> Self {
+        Fault::Other(what.into())
+    }
+}
+
 impl Header {
     /// Parses the first bytes of a file or archive member, at most [`MAX_HEADER`].
-    /// The error is what is wrong.
-    pub fn read(first: &[u8]) -> Result<Self, String> {
+    pub fn read(first: &[u8]) -> Result<Self, Fault> {
         let cut = || "the header is cut".to_string();
         let rest = first.strip_prefix(MAGIC).ok_or("it does not begin as a .npy file does")?;
         let ([version, _], rest) = rest.split_first_chunk().ok_or_else(cut)?;
@@ -44,7 +57,7 @@ impl Header {
                 let (n, text) = rest.split_first_chunk().ok_or_else(cut)?;
                 (u32::from_le_bytes(*n) as usize, text)
             }
-            n => return Err(format!("version {n} of the format is not known")),
+            n => return Err(format!("version {n} of the format is not known").into()),
         };
         let header = text.get(..length).ok_or_else(cut)?;
         let header = String::from_utf8_lossy(header);
@@ -59,14 +72,15 @@ impl Header {
         }
         let descr = value("descr").ok_or_else(|| missing("descr"))?;
         let descr = descr.strip_prefix('\'').and_then(|d| d.split_once('\'')).map(|(d, _)| d);
-        let number = descr.and_then(Number::of).ok_or_else(|| {
-            format!("its numbers are {}, not integers or floats", descr.unwrap_or("records"))
-        })?;
         let shape = value("shape").ok_or_else(|| missing("shape"))?;
         let shape = shape.strip_prefix('(').and_then(|s| s.split_once(')')).map(|(s, _)| s);
         let sizes = shape.unwrap_or("?").split(',').map(str::trim).filter(|s| !s.is_empty());
         let sizes: Option<Vec<usize>> = sizes.map(|s| s.parse().ok()).collect();
         let shape = sizes.ok_or("the shape is not understood")?;
+        let number = descr.and_then(Number::of).ok_or_else(|| {
+            let kind = descr.unwrap_or("records");
+            Fault::Numbers(format!("its numbers are {kind}, not integers or floats"), shape.len())
+        })?;
         Ok(Header { number, shape, length: (first.len() - text.len() + length) as u64 })
     }
 
@@ -158,7 +172,10 @@ mod tests {
 
     #[test]
     fn what_is_no_array_of_numbers_is_refused() {
-        let of = |text: &str| Header::read(&file(text)).unwrap_err();
+        let of = |text: &str| match Header::read(&file(text)).unwrap_err() {
+            Fault::Numbers(what, 1) | Fault::Other(what) => what,
+            fault => panic!("{fault:?}"),
+        };
         let fortran = of("{'descr': '<u2', 'fortran_order': True, 'shape': (2,), }");
         assert!(fortran.contains("ascontiguousarray"), "{fortran}");
         let objects = of("{'descr': '|O', 'fortran_order': False, 'shape': (2,), }");

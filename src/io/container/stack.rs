@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::blocks::Source;
-use super::npy::{Header, MAX_HEADER};
+use super::npy::{Fault, Header, MAX_HEADER};
 use super::npz::{Body, Member, members};
 use super::pixels::Pixels;
 use super::scale::{Scale, words};
@@ -35,8 +35,10 @@ struct Array {
 }
 
 impl Array {
-    /// Fails if the data are shorter than the header says.
-    fn open(path: &Path, member: Option<&Member>) -> Result<Self> {
+    /// The array, or why it is no stack of depth images and its number of dimensions, where its numbers are of
+    /// another kind.
+    /// Fails if the data are shorter than the header says, or the header is not understood.
+    fn open(path: &Path, member: Option<&Member>) -> Result<Result<Self, (Error, usize)>> {
         let name = member.map(|m| m.name.clone());
         let source = Source::open(path)?;
         let size = member.map_or(source.length, |m| m.size);
@@ -46,14 +48,20 @@ impl Array {
         };
         let first = body.bytes(0, size.min(MAX_HEADER), "the header of an array")?;
         let array = |header| Array { path: path.into(), name: name.clone(), header, body };
-        let header = Header::read(&first).map_err(|why| wrong(path, &name, why, REMEDY))?;
+        let header = match Header::read(&first) {
+            Ok(header) => header,
+            Err(Fault::Numbers(why, dimensions)) => {
+                return Ok(Err((wrong(path, &name, why, REMEDY), dimensions)));
+            }
+            Err(Fault::Other(why)) => return Err(wrong(path, &name, why, REMEDY)),
+        };
         let there = size.saturating_sub(header.length);
         if header.bytes().is_none_or(|n| n > there) {
             let what =
                 format!("the shape {:?} needs more than the {there} bytes there", header.shape);
             return Err(wrong(path, &name, what, REMEDY_CUT));
         }
-        Ok(array(header))
+        Ok(Ok(array(header)))
     }
 
     fn wrong(&self, what: impl Into<String>, remedy: &'static str) -> Error {
@@ -88,7 +96,8 @@ pub fn open_npy(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
             remedy: "leave the option out",
         });
     }
-    film(Array::open(path, None)?, Beside::default(), assumed)
+    let array = Array::open(path, None)?.map_err(|(e, _)| e)?;
+    film(array, Beside::default(), assumed)
 }
 
 pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
@@ -96,11 +105,10 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
         |name: &str| BESIDE.contains(&name) || assumed.topic.as_deref().is_some_and(|t| t == name);
     let (mut arrays, mut unread) = (Vec::new(), None);
     for member in &members(path)? {
-        match Array::open(path, Some(member)) {
+        match Array::open(path, Some(member))? {
             Ok(array) => arrays.push(array),
-            Err(e) if is_used(&member.name) => return Err(e),
-            // Of a kind that no depth image has.
-            Err(e) => unread = unread.or(Some(e)),
+            Err((e, _)) if is_used(&member.name) => return Err(e),
+            Err((e, dimensions)) => unread = unread.or((dimensions > 2).then_some(e)),
         }
     }
     let stacks: Vec<usize> =
