@@ -44,7 +44,7 @@ pub struct EdgeLoss {
 struct Crossing {
     /// Index of the last pixel on the target.
     last: isize,
-    /// Whether the pixel beside it, lost alone in the first frame, may be the target's.
+    /// Whether the pixel beside it was lost alone in the first frame, and may be the target's.
     is_doubtful: bool,
     /// Index step from one pixel to the next, outwards.
     stride: isize,
@@ -62,7 +62,7 @@ pub struct Edges {
     crossings: Vec<Crossing>,
     frames: usize,
     pub inside: [Sums; INSIDE_PX],
-    /// Left and right; `lost` is summed over all frames.
+    /// Left and right; `lost` and `shaded` are summed over all frames.
     sides: [EdgeLoss; 2],
     pub sigma_px: f64,
     /// Drop in disparity from the target to the background, px.
@@ -80,7 +80,8 @@ impl Edges {
 
     /// Losses per frame on a side; `None` where too few rows were seen.
     pub fn beside(&self, side: usize) -> Option<EdgeLoss> {
-        let beside = EdgeLoss { lost: self.lost_px(side), ..self.sides[side] };
-        (beside.rows >= MIN_ROWS).then_some(beside)
+        let shaded = self.sides[side].shaded / self.frames.max(1) as f64;
+        let beside = EdgeLoss { lost: self.lost_px(side), shaded, ..self.sides[side] };
+        (beside.rows >= MIN_ROWS && shaded > 0.0).then_some(beside)
     }
 }

@@ -36,7 +36,6 @@ impl Edges {
                 sigma += noise * (own + crossing.step) / own;
                 if let Some(side) = crossing.side {
                     edges.sides[side].rows += 1.0;
-                    edges.sides[side].shaded -= crossing.step;
                 }
                 edges.crossings.push(crossing);
             }
@@ -78,11 +77,14 @@ impl Edges {
                     pixels.filter(lost).count() as f64
                 };
                 let beyond = shadow + fringe_px(field.width);
-                let counts = [[usize::from(c.is_doubtful), shadow], [beyond, beyond + BEYOND_PX]]
+                // The first frame chose the last pixel as one with a reading, so the next is lost too often.
+                let first = usize::from(self.frames == 1 || c.is_doubtful);
+                let counts = [[first, shadow], [beyond, beyond + BEYOND_PX]]
                     .map(|[from, to]| [lost(from..to), (to - from) as f64]);
                 let [[within, width], [anyway, of]] = counts;
                 let sums = &mut self.sides[side];
                 sums.lost += within - anyway / of * width;
+                sums.shaded += (-c.step - first as f64).max(0.0);
                 sums.counts
                     .as_flattened_mut()
                     .iter_mut()
