@@ -47,7 +47,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     }
     let output = new(&arguments.output, Leaves::RECORDING)?;
     let sigma = arguments.sigma.as_deref();
-    let leaves = |place| if is_uncertainty(place) { UNCERTAINTY } else { Leaves::RECORDING };
+    // What another command left there is not replaced.
+    let foreign = |place: &Path| place.join("sigma.json").exists() && !is_uncertainty(place);
+    let leaves = |place| if foreign(place) { Leaves::Images { marks: &[] } } else { UNCERTAINTY };
     let uncertainty = sigma.map(|place| new(place, leaves(place))).transpose()?;
     let corrected = working("correcting", |step| {
         let sigma = uncertainty.as_ref().map(OutputFolder::path);

@@ -109,17 +109,27 @@ fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
         }
         distances.last_mut().into_iter().for_each(|d| d.push(view));
     }
+    // Of more distances, those share a fold whose middle views lie in one of as many equal parts.
     let total: usize = distances.iter().map(Vec::len).sum();
-    let (mut folds, mut before, mut last) = (Vec::<Vec<usize>>::new(), 0, None);
-    for (k, distance) in distances.iter().enumerate() {
-        // Of more distances, those share a fold whose middle views lie in one of as many equal parts.
-        let middle = (2 * before + distance.len()) * MAX_FOLDS / (2 * total);
-        let part = Some(if distances.len() > MAX_FOLDS { middle } else { k });
-        if part != last {
+    let mut before = 0;
+    let middles = distances.iter().map(|d| {
+        before += d.len();
+        (2 * before - d.len()) * MAX_FOLDS / (2 * total)
+    });
+    let mut parts: Vec<usize> = middles.collect();
+    // Few remain where most views are of one distance.
+    let mut different = parts.clone();
+    different.dedup();
+    if distances.len() <= MAX_FOLDS || different.len() < 3 {
+        let count = MAX_FOLDS.min(distances.len());
+        parts = (0..distances.len()).map(|k| k * count / distances.len()).collect();
+    }
+    let mut folds: Vec<Vec<usize>> = Vec::new();
+    for (k, distance) in distances.into_iter().enumerate() {
+        if k == 0 || parts[k] != parts[k - 1] {
             folds.push(Vec::new());
         }
-        folds.last_mut().into_iter().for_each(|f| f.extend(distance));
-        (before, last) = (before + distance.len(), part);
+        folds.last_mut().into_iter().for_each(|f| f.extend(&distance));
     }
     if folds.len() < 3 {
         return Vec::new();
@@ -166,5 +176,9 @@ mod tests {
         let sizes: Vec<usize> =
             (0..MAX_FOLDS).map(|k| folds.iter().filter(|f| f.1 == k).count()).collect();
         assert!(sizes.iter().all(|n| (5..=13).contains(n)), "{sizes:?}");
+        // 56 views of the nearest of nine distances.
+        let mut uneven = table(64, 1);
+        uneven.rows.iter_mut().for_each(|r| r.z_m = 1.0 + 0.5 * r.view.saturating_sub(55) as f64);
+        assert_eq!(super::folds(&uneven).iter().map(|f| f.1).max(), Some(MAX_FOLDS - 1));
     }
 }

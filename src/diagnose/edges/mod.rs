@@ -62,7 +62,7 @@ pub struct Edges {
     crossings: Vec<Crossing>,
     frames: usize,
     pub inside: [Sums; INSIDE_PX],
-    /// Left and right; `lost` and `shaded` are summed over all frames.
+    /// Left and right; `lost` is summed over all frames but the first, where there are others.
     sides: [EdgeLoss; 2],
     pub sigma_px: f64,
     /// Drop in disparity from the target to the background, px.
@@ -75,13 +75,12 @@ const MIN_ROWS: f64 = 8.0;
 impl Edges {
     /// Pixels lost per frame on a side (0 left, 1 right).
     pub fn lost_px(&self, side: usize) -> f64 {
-        self.sides[side].lost / self.frames.max(1) as f64
+        self.sides[side].lost / self.frames.saturating_sub(1).max(1) as f64
     }
 
     /// Losses per frame on a side; `None` where too few rows were seen.
     pub fn beside(&self, side: usize) -> Option<EdgeLoss> {
-        let shaded = self.sides[side].shaded / self.frames.max(1) as f64;
-        let beside = EdgeLoss { lost: self.lost_px(side), shaded, ..self.sides[side] };
-        (beside.rows >= MIN_ROWS && shaded > 0.0).then_some(beside)
+        let beside = EdgeLoss { lost: self.lost_px(side), ..self.sides[side] };
+        (beside.rows >= MIN_ROWS).then_some(beside)
     }
 }

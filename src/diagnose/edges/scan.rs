@@ -36,6 +36,7 @@ impl Edges {
                 sigma += noise * (own + crossing.step) / own;
                 if let Some(side) = crossing.side {
                     edges.sides[side].rows += 1.0;
+                    edges.sides[side].shaded -= crossing.step;
                 }
                 edges.crossings.push(crossing);
             }
@@ -52,6 +53,7 @@ impl Edges {
         // target looks mixed there. Other frames are fair; without any, that pixel is left out.
         if self.frames == 2 {
             self.inside = Default::default();
+            self.sides.iter_mut().for_each(|side| side.lost = 0.0);
         }
         let fair = usize::from(self.frames == 1);
         let depth = |i: isize| f64::from(table.metres(frame.raw[i as usize]));
@@ -72,19 +74,20 @@ impl Edges {
             }
             if let Some(side) = c.side {
                 let shadow = shadow_px(c.step);
-                let lost = |pixels: std::ops::Range<usize>| {
-                    let lost = |n: &usize| !depth(c.last + (n + 1) as isize * c.stride).is_finite();
-                    pixels.filter(lost).count() as f64
-                };
+                let is_lost = |n: usize| !depth(c.last + (n + 1) as isize * c.stride).is_finite();
+                let lost =
+                    |pixels: std::ops::Range<usize>| pixels.filter(|&n| is_lost(n)).count() as f64;
                 let beyond = shadow + fringe_px(field.width);
-                // The first frame chose the last pixel as one with a reading, so the next is lost too often.
-                let first = usize::from(self.frames == 1 || c.is_doubtful);
+                // The first frame chose the last pixel as one with a reading, so the next is lost too often:
+                // alone, it may be the target's.
+                let first = fair.max(usize::from(c.is_doubtful));
                 let counts = [[first, shadow], [beyond, beyond + BEYOND_PX]]
                     .map(|[from, to]| [lost(from..to), (to - from) as f64]);
-                let [[within, width], [anyway, of]] = counts;
+                let border = is_lost(0) && (fair == 0 || is_lost(1));
+                let within = lost(1..shadow) + f64::from(u8::from(border));
+                let [_, [anyway, of]] = counts;
                 let sums = &mut self.sides[side];
-                sums.lost += within - anyway / of * width;
-                sums.shaded += (-c.step - first as f64).max(0.0);
+                sums.lost += within - anyway / of * shadow as f64;
                 sums.counts
                     .as_flattened_mut()
                     .iter_mut()

@@ -33,6 +33,8 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 pub enum Fault {
     /// The array is whole, but its numbers are of a kind that no depth image has; how many dimensions.
     Numbers(String, usize),
+    /// The same of an array in Fortran's order.
+    Order(String, usize),
     Other(String),
 }
 
@@ -67,9 +69,6 @@ impl Header {
         };
         let missing = |key: &str| format!("the header has no {key}");
         let order = value("fortran_order").ok_or_else(|| missing("fortran_order"))?;
-        if !order.starts_with("False") {
-            return Err("it is in Fortran's order; save np.ascontiguousarray(a)".into());
-        }
         let descr = value("descr").ok_or_else(|| missing("descr"))?;
         let descr = descr.strip_prefix('\'').and_then(|d| d.split_once('\'')).map(|(d, _)| d);
         let shape = value("shape").ok_or_else(|| missing("shape"))?;
@@ -81,6 +80,10 @@ impl Header {
             let kind = descr.unwrap_or("records");
             Fault::Numbers(format!("its numbers are {kind}, not integers or floats"), shape.len())
         })?;
+        if !order.starts_with("False") {
+            let what = "it is in Fortran's order; save np.ascontiguousarray(a)".into();
+            return Err(Fault::Order(what, shape.len()));
+        }
         Ok(Header { number, shape, length: (first.len() - text.len() + length) as u64 })
     }
 
@@ -173,7 +176,7 @@ mod tests {
     #[test]
     fn what_is_no_array_of_numbers_is_refused() {
         let of = |text: &str| match Header::read(&file(text)).unwrap_err() {
-            Fault::Numbers(what, 1) | Fault::Other(what) => what,
+            Fault::Numbers(what, 1) | Fault::Order(what, 1) => what,
             fault => panic!("{fault:?}"),
         };
         let fortran = of("{'descr': '<u2', 'fortran_order': True, 'shape': (2,), }");

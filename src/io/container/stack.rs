@@ -35,9 +35,8 @@ struct Array {
 }
 
 impl Array {
-    /// The array, or why it is no stack of depth images and its number of dimensions, where its numbers are of
-    /// another kind.
-    /// Fails if the data are shorter than the header says, or the header is not understood.
+    /// The array, or why it is no stack of depth images and its number of dimensions, where it is whole.
+    /// Fails if it is a stack in Fortran's order, the data are shorter than the header says, or the header is not understood.
     fn open(path: &Path, member: Option<&Member>) -> Result<Result<Self, (Error, usize)>> {
         let name = member.map(|m| m.name.clone());
         let source = Source::open(path)?;
@@ -53,6 +52,11 @@ impl Array {
             Err(Fault::Numbers(why, dimensions)) => {
                 return Ok(Err((wrong(path, &name, why, REMEDY), dimensions)));
             }
+            // A stack may be the depth itself, which no other stack stands for.
+            Err(Fault::Order(why, dimensions)) if dimensions < 3 => {
+                return Ok(Err((wrong(path, &name, why, REMEDY), dimensions)));
+            }
+            Err(Fault::Order(why, _)) => return Err(wrong(path, &name, why, REMEDY)),
             Err(Fault::Other(why)) => return Err(wrong(path, &name, why, REMEDY)),
         };
         let there = size.saturating_sub(header.length);
