@@ -208,7 +208,7 @@ fn describe(options: &CalibrateOptions, form: Form, compared: bool) -> Map<Strin
     let chosen_by = match options.form {
         Some(_) => "user",
         None if compared => "held-out distances",
-        None => "default: too few distances to compare forms",
+        None => "default: no form can be judged at distances left out",
     };
     let planes = match options.measure.planes {
         Planes::PerView => "view",

@@ -231,8 +231,8 @@ fn physics(
     Ok(Physics::Speckle { causes })
 }
 
-/// The model's own sensor, where it has one, its sigma, or Eq. 1, and its effects. Refuses effects `given` beside a model
-/// that has a shape of them already: they would count twice.
+/// The model's own sensor, where it has one, its sigma, or Eq. 1, and its effects. Refuses effects `given`
+/// beside a model that has a shape of them already: they would count twice.
 fn sensor_and_noise(
     model: Option<&Path>,
     shrink: Option<usize>,

@@ -7,7 +7,6 @@ use crate::camera::{Camera, Rays};
 use crate::effects::{Active, Inverse};
 use crate::error::Result;
 use crate::model::{self, NoiseModel, SigmaModel};
-use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::{ANYWHERE, LearntTerm, Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
 
@@ -81,8 +80,7 @@ impl Correction {
         let scale_px_m = of_model
             .as_ref()
             .and_then(Sensor::disparity_px_m)
-            .or(sensor.disparity_px_m())
-            .unwrap_or(camera.fx * KINECT_BASELINE_M);
+            .unwrap_or_else(|| sensor.scale_px_m());
         let mut correction = Correction {
             rays: camera.rays(),
             scale_px_m,

@@ -21,6 +21,9 @@ impl Correction {
     /// becomes infinite where the errors leave no disparity.
     /// Fails if the image does not have the sensor's size.
     pub fn apply(&self, depth_m: &mut [f32], conditions: &Conditions) -> Result<()> {
+        if self.is_identity() {
+            return self.refuse_size(depth_m);
+        }
         let corrected = self.corrected(depth_m, conditions)?;
         depth_m.iter_mut().zip(corrected).for_each(|(z, depth)| *z = depth as f32);
         Ok(())

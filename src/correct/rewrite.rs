@@ -111,6 +111,7 @@ pub(super) fn sigma_word(sigma_m: f64) -> u16 {
         (sigma_m * SIGMA_UNITS_PER_METRE).round().clamp(1.0, TOP) as u16
     }
 }
+
 pub(super) const SIGMA_FORMAT: &str = "kinoise-correction-sigma/1";
 
 /// Whether the folder holds uncertainties of an earlier correction.

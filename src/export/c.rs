@@ -76,9 +76,9 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
     let locking = correction.locking.as_ref();
     let (locking_px, unlocking) =
         locking.map_or((0.0, &[][..]), |l| (l.amplitude_px(), l.shifts()));
-    let (units, offset, slope, invalid, raw) = match sensor.code {
-        DepthCode::Metric { units_per_metre, invalid } => (units_per_metre, 0.0, 1.0, invalid, 0),
-        DepthCode::Disparity { offset, slope, invalid } => (1.0, offset, slope, invalid, 1),
+    let (units, offset, slope, raw) = match sensor.code {
+        DepthCode::Metric { units_per_metre, .. } => (units_per_metre, 0.0, 1.0, 0),
+        DepthCode::Disparity { offset, slope, .. } => (1.0, offset, slope, 1),
     };
     let counts = [
         ("WIDTH", camera.width),
@@ -104,7 +104,7 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
         ("units_per_metre", units),
         ("raw_offset", offset),
         ("raw_slope", slope),
-        ("invalid", f64::from(invalid)),
+        ("invalid", f64::from(sensor.code.invalid())),
         ("raw_end", f64::from(sensor.code.end())),
     ];
     let mut text = String::from("\n");

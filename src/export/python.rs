@@ -72,12 +72,10 @@ fn constants(sensor: &Sensor, correction: &Correction) -> String {
     let camera = &correction.camera;
     let mut text = format!("\n\nWIDTH, HEIGHT = {}, {}\n", camera.width, camera.height);
     let distortion = camera.distortion.map(|k| format!("({})", k.map(number).join(", ")));
-    let (units, raw, invalid) = match sensor.code {
-        DepthCode::Metric { units_per_metre, invalid } => {
-            (number(units_per_metre), "None".to_string(), invalid)
-        }
-        DepthCode::Disparity { offset, slope, invalid } => {
-            ("None".into(), format!("({}, {})", number(offset), number(slope)), invalid)
+    let (units, raw) = match sensor.code {
+        DepthCode::Metric { units_per_metre, .. } => (number(units_per_metre), "None".to_string()),
+        DepthCode::Disparity { offset, slope, .. } => {
+            ("None".into(), format!("({}, {})", number(offset), number(slope)))
         }
     };
     let drift = |d: &Drift| format!("({}, {})", number(d.relative), number(d.time_constant_s));
@@ -95,7 +93,7 @@ fn constants(sensor: &Sensor, correction: &Correction) -> String {
         ("scale_px_m", number(correction.scale_px_m)),
         ("units_per_metre", units),
         ("raw_disparity", raw),
-        ("invalid", invalid.to_string()),
+        ("invalid", sensor.code.invalid().to_string()),
         ("raw_end", sensor.code.end().to_string()),
         ("scale", number(correction.scale)),
         ("drifts", format!("[{}]", drifts.join(", "))),

@@ -117,25 +117,25 @@ fn folds(table: &SigmaTable) -> Vec<(usize, usize)> {
         (2 * before - d.len()) * MAX_FOLDS / (2 * total)
     });
     let mut parts: Vec<usize> = middles.collect();
+    let different = |parts: &[usize]| {
+        let mut parts = parts.to_vec();
+        parts.dedup();
+        parts
+    };
     // Few remain where most views are of one distance.
-    let mut different = parts.clone();
-    different.dedup();
-    if distances.len() <= MAX_FOLDS || different.len() < 3 {
+    if distances.len() <= MAX_FOLDS || different(&parts).len() < 3 {
         let count = MAX_FOLDS.min(distances.len());
         parts = (0..distances.len()).map(|k| k * count / distances.len()).collect();
     }
-    let mut folds: Vec<Vec<usize>> = Vec::new();
-    for (k, distance) in distances.into_iter().enumerate() {
-        if k == 0 || parts[k] != parts[k - 1] {
-            folds.push(Vec::new());
-        }
-        folds.last_mut().into_iter().for_each(|f| f.extend(&distance));
-    }
+    let folds = different(&parts);
     if folds.len() < 3 {
         return Vec::new();
     }
-    let of = |(k, views): (usize, Vec<usize>)| views.into_iter().map(move |view| (view, k));
-    folds.into_iter().enumerate().flat_map(of).collect()
+    let of = |(views, part): (Vec<usize>, usize)| {
+        let fold = folds.partition_point(|p| *p < part);
+        views.into_iter().map(move |view| (view, fold))
+    };
+    distances.into_iter().zip(parts).flat_map(of).collect()
 }
 
 #[cfg(test)]

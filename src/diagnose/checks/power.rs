@@ -51,8 +51,7 @@ impl DetectionCriteria<'_> {
         let alone = Beside::of(&views, m, self.rules.prior)?.alone(&views);
         let null = Null::of_candidate(&alone, self.rules.prior)?;
         let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
-        let beside_others = !self.outcome.chosen.is_empty();
-        let rules = if beside_others { self.rules.later() } else { self.rules };
+        let rules = self.rules.beside(self.outcome.chosen.len());
         let threshold = self.outcome.noise.threshold(Group::Named, rules.level);
         let need =
             null.gain_for(threshold, alone.len(), &self.rules).max(MIN_SHARE_OF_GAIN * first);

@@ -74,25 +74,23 @@ impl Edges {
             }
             if let Some(side) = c.side {
                 let shadow = shadow_px(c.step);
-                let is_lost = |n: usize| !depth(c.last + (n + 1) as isize * c.stride).is_finite();
-                let lost =
-                    |pixels: std::ops::Range<usize>| pixels.filter(|&n| is_lost(n)).count() as f64;
-                let beyond = shadow + fringe_px(field.width);
+                let lost = |[from, to]: [usize; 2]| {
+                    let lost = |n: &usize| !depth(c.last + (n + 1) as isize * c.stride).is_finite();
+                    (from..to).filter(lost).count() as f64
+                };
                 // The first frame chose the last pixel as one with a reading, so the next is lost too often:
                 // alone, it may be the target's.
-                let first = fair.max(usize::from(c.is_doubtful));
-                let counts = [[first, shadow], [beyond, beyond + BEYOND_PX]]
-                    .map(|[from, to]| [lost(from..to), (to - from) as f64]);
-                let border = is_lost(0) && (fair == 0 || is_lost(1));
-                let within = lost(1..shadow) + f64::from(u8::from(border));
-                let [_, [anyway, of]] = counts;
+                let doubtful = usize::from(c.is_doubtful);
+                let beyond = shadow + fringe_px(field.width);
+                let within = lost([fair * doubtful, shadow]);
+                let spans = [[fair.max(doubtful), shadow], [beyond, beyond + BEYOND_PX]];
                 let sums = &mut self.sides[side];
-                sums.lost += within - anyway / of * shadow as f64;
-                sums.counts
-                    .as_flattened_mut()
-                    .iter_mut()
-                    .zip(counts.as_flattened())
-                    .for_each(|(sum, n)| *sum += n);
+                for (counts, span) in sums.counts.iter_mut().zip(spans) {
+                    counts[0] += lost(span);
+                    counts[1] += (span[1] - span[0]) as f64;
+                }
+                let anyway = lost(spans[1]) / BEYOND_PX as f64;
+                sums.lost += within - anyway * shadow as f64;
             }
         }
     }

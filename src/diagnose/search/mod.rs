@@ -229,7 +229,7 @@ impl<'a> Layer<'a> {
         }
         let noise = self.noise.as_ref()?;
         let candidates = self.candidates;
-        let rules = if chosen.is_empty() { *self.rules } else { self.rules.later() };
+        let rules = self.rules.beside(chosen.len());
         let mut next =
             Choice { candidates, judged: &judged, rules: &rules, noise }.best(&beside)?;
         period::tune(candidates, chosen, &mut next, |terms| self.total(terms));

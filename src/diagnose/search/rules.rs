@@ -42,6 +42,11 @@ pub struct Rules {
 pub const LATER_LEVEL: f64 = 0.3;
 
 impl Rules {
+    /// The rules for a term beside this many others.
+    pub fn beside(self, others: usize) -> Self {
+        if others > 0 { self.later() } else { self }
+    }
+
     /// The rules for terms beside others.
     pub fn later(self) -> Self {
         Rules { level: LATER_LEVEL * self.level, ..self }

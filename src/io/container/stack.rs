@@ -190,9 +190,46 @@ impl Beside {
         }
         Ok(beside)
     }
+
+    /// Fails where the arrays that no option replaces cannot belong to these frames, rows and columns.
+    fn check(
+        &self,
+        images: &Array,
+        [count, height, width]: [usize; 3],
+        assumed: &Assumed,
+    ) -> Result<()> {
+        let are_times = |s: &Vec<f64>| {
+            let times = s.iter().all(|t| t.abs() < LATEST_S);
+            s.len() == count && times && s.is_sorted_by(|a, b| a <= b)
+        };
+        if !self.stamps.as_ref().is_none_or(are_times) {
+            let what =
+                format!("its {count} images do not have as many timestamps in seconds, in order");
+            return Err(images.wrong(what, "save one a frame, in seconds"));
+        }
+        let own = self.intrinsics.filter(|_| assumed.intrinsics.is_none());
+        let camera = own.and_then(|[fx, fy, cx, cy]| {
+            Camera { width, height, fx, fy, cx, cy, distortion: None }.fault()
+        });
+        if let Some(fault) = camera {
+            let what = format!("its intrinsics: {fault}");
+            return Err(Error::recording(&images.path, what, REMEDY_K));
+        }
+        let own = self.code().filter(|_| assumed.code.is_none());
+        match own.and_then(|code| code.fault()) {
+            Some(fault) => Err(Error::recording(&images.path, fault, REMEDY_UNITS)),
+            None => Ok(()),
+        }
+    }
+
+    fn code(&self) -> Option<DepthCode> {
+        let metric = |units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 };
+        self.units_per_metre.map(metric)
+    }
 }
 
 const REMEDY_K: &str = "correct it, or leave it out and give --intrinsics fx,fy,cx,cy";
+const REMEDY_UNITS: &str = "correct it, or leave it out and give --units-per-metre";
 
 #[derive(Debug)]
 struct Stack {
@@ -247,41 +284,17 @@ fn film(array: Array, beside: Beside, assumed: &Assumed) -> Result<(Footage, Sen
         return Err(array.wrong(format!("images of {width} x {height} px are not usable"), REMEDY));
     }
     let path = array.path.clone();
-    let stamps = beside.stamps;
-    let are_times = |s: &Vec<f64>| {
-        let times = s.iter().all(|t| t.abs() < LATEST_S);
-        s.len() == count && times && s.is_sorted_by(|a, b| a <= b)
-    };
-    if !stamps.as_ref().is_none_or(are_times) {
-        let what =
-            format!("its {count} images do not have as many timestamps in seconds, in order");
-        return Err(array.wrong(what, "save one a frame, in seconds"));
-    }
-    let own_camera = beside.intrinsics.filter(|_| assumed.intrinsics.is_none());
-    let own_camera = own_camera.and_then(|[fx, fy, cx, cy]| {
-        Camera { width, height, fx, fy, cx, cy, distortion: None }.fault()
-    });
-    if let Some(fault) = own_camera {
-        return Err(Error::recording(&path, format!("its intrinsics: {fault}"), REMEDY_K));
-    }
-    let own_units = beside.units_per_metre.filter(|_| assumed.code.is_none());
-    let own_units = own_units
-        .and_then(|units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 }.fault());
-    if let Some(fault) = own_units {
-        const REMEDY: &str = "correct it, or leave it out and give --units-per-metre";
-        return Err(Error::recording(&path, fault, REMEDY));
-    }
+    beside.check(&array, [count, height, width], assumed)?;
     let given = Assumed {
         intrinsics: assumed.intrinsics.or(beside.intrinsics),
-        code: assumed.code.or(beside
-            .units_per_metre
-            .map(|units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 })),
+        code: assumed.code.or(beside.code()),
         ..assumed.clone()
     };
     if given.intrinsics.is_none() && given.preset.is_none() {
         const GIVE: &str = "give --intrinsics fx,fy,cx,cy in pixels, or --sensor";
         return Err(array.wrong("it carries no intrinsics", GIVE));
     }
+    let stamps = beside.stamps;
     let mut remarks = Vec::new();
     let mut stack =
         Stack { array, size: (width, height), values_per_metre: 1.0, units_per_metre: 1.0 };
