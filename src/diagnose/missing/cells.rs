@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::odds::{bias, odds};
 use crate::camera::Camera;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
@@ -18,8 +19,17 @@ pub struct Cell<'a> {
     pub place: &'a PixelContext,
     pub lost: f64,
     pub asked: f64,
+    /// See [`bias`], for the share that the view usually loses.
+    pub bias: f64,
     /// Whether it is compared with a twin and it, a neighbour or one of their twins loses something.
     pub differs: bool,
+}
+
+impl Cell<'_> {
+    /// Log odds of the share lost.
+    pub fn odds(&self) -> f64 {
+        odds(self.lost / self.asked) - self.bias
+    }
 }
 
 /// A patch of many tiles, with its own place.
@@ -30,12 +40,28 @@ pub struct Patch {
     pub asked: f64,
 }
 
-/// Converts the patches to cells.
-pub fn cells(patches: &[Vec<Patch>]) -> Vec<Vec<Cell<'_>>> {
-    fn cell(p: &Patch) -> Cell<'_> {
-        Cell { place: &p.place, lost: p.lost, asked: p.asked, differs: false }
+/// Converts the patches to cells. So many readings are lost `together`.
+pub fn cells(patches: &[Vec<Patch>], together: f64) -> Vec<Vec<Cell<'_>>> {
+    fn of_view(view: &[Patch], together: f64) -> Vec<Cell<'_>> {
+        let usual = usual_share(view);
+        let cell = |&Patch { ref place, lost, asked }| {
+            Cell { place, lost, asked, bias: bias(usual, asked, together), differs: false }
+        };
+        view.iter().map(cell).collect()
     }
-    patches.iter().map(|view| view.iter().map(cell).collect()).collect()
+    patches.iter().map(|view| of_view(view, together)).collect()
+}
+
+/// Share that half of the readings asked for lie below, patch by patch: a clump does not move it.
+fn usual_share(view: &[Patch]) -> f64 {
+    let mut shares: Vec<[f64; 2]> = view.iter().map(|p| [p.lost / p.asked, p.asked]).collect();
+    shares.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut left = 0.5 * shares.iter().map(|s| s[1]).sum::<f64>();
+    let middle = shares.iter().find(|[_, asked]| {
+        left -= asked;
+        left <= 0.0
+    });
+    middle.map_or(0.0, |s| s[0])
 }
 
 /// Cells across the picture: about a hundred a view, each wider than a clump of dead pixels.
@@ -79,7 +105,7 @@ fn key(cell: &Cell<'_>, rim: f64) -> (u32, u32, bool) {
 pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) -> Vec<Vec<f64>> {
     let of_view = |(mine, theirs): (&mut Vec<Cell<'_>>, &Vec<Cell<'_>>)| {
         let lost: BTreeMap<_, f64> =
-            theirs.iter().map(|c| (key(c, rim), odds(c.lost / c.asked) - odds(0.0))).collect();
+            theirs.iter().map(|c| (key(c, rim), c.odds() - odds(0.0))).collect();
         mine.retain(|c| lost.contains_key(&key(c, rim)));
         let expected: Vec<f64> = mine.iter().map(|c| lost[&key(c, rim)]).collect();
         let loses: Vec<bool> =
@@ -100,25 +126,11 @@ pub fn fine<'a>(survey: &'a Survey, margins: &Margins) -> Vec<Vec<Cell<'a>>> {
         let held = v.patches().filter(|(place, _)| margins.hold(place));
         held.map(|(place, t)| {
             let (lost, asked) = (t.asked * t.missing, t.asked);
-            Cell { place, lost, asked, differs: false }
+            Cell { place, lost, asked, bias: 0.0, differs: false }
         })
         .collect()
     };
     survey.views.iter().map(of_view).collect()
-}
-
-/// Losses below this share are indistinguishable.
-const HARDLY: f64 = 0.002;
-
-/// Log odds of a share, flattened near 0 and 1.
-pub fn odds(share: f64) -> f64 {
-    ((share + HARDLY) / (1.0 - share + HARDLY)).ln()
-}
-
-/// Inverse of [`odds`].
-pub fn share(odds: f64) -> f64 {
-    let e = odds.exp();
-    (((1.0 + HARDLY) * e - HARDLY) / (1.0 + e)).clamp(0.0, 1.0)
 }
 
 /// Variances of the log odds without a cause.

@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn single_losses_are_single_however_they_rise_along_the_axis() {
         let along = |sign: f64, view: &[Patch]| {
-            clump(&cells(&[view.to_vec()]), &|c: &Cell<'_>| sign * c.place.u)
+            clump(&cells(&[view.to_vec()], 1.0), &|c: &Cell<'_>| sign * c.place.u)
         };
         let even = along(1.0, &view(|_| 0.01, |_, _| false));
         let rising = view(|u| 0.3 * (-u / 10.0).exp(), |_, _| false);

@@ -11,6 +11,7 @@ pub mod few;
 pub mod fit;
 pub mod forms;
 pub mod hard_end;
+mod odds;
 pub mod points;
 pub mod report;
 mod round;
@@ -28,6 +29,7 @@ use crate::diagnose::views::tiles::rim_px;
 use crate::rng::Seed;
 use crate::terms::{Axis, Extent};
 use cells::{Cell, MIN_SCATTER, USUAL, cells, expected, fine, patches};
+use clumps::clump;
 use dropout_cells::DropoutCells;
 use few::few_losses;
 use hard_end::{CloseLook, HardEnd, blur};
@@ -83,9 +85,13 @@ pub fn missing(
     let second = survey.second();
     let margins = Margins::of(fields);
     let (large, fine) = (patches(survey, camera, &margins), fine(survey, &margins));
-    let mut mine = cells(&large);
+    // A dead pixel is lost in all frames, and a failed match in one.
+    let frames = fields.iter().map(|f| f.frames.len()).max().unwrap_or(1);
+    let together = clump(&fine, &|_| 0.0).min(frames.max(1) as f64);
+    let mut mine = cells(&large, together);
     let expected = twins.map(|(_, survey)| {
-        expected(&mut mine, &cells(&patches(survey, camera, &margins)), rim_px(camera))
+        let twins = patches(survey, camera, &margins);
+        expected(&mut mine, &cells(&twins, together), rim_px(camera))
     });
     let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
     let look = CloseLook {

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::cells::{Cell, Scatter, USUAL, Whitener, odds, share};
+use super::cells::{Cell, Scatter, USUAL, Whitener};
+use super::odds::{odds, share};
 use super::shapes::{Shape, Step, begun};
 use crate::diagnose::checks::replication::Halves;
 use crate::diagnose::options::POWER_80;
@@ -99,9 +100,7 @@ impl<'a> Losses<'a> {
         let left: Vec<Vec<f64>> = views
             .iter()
             .zip(explained)
-            .map(|(cells, e)| {
-                cells.iter().zip(e).map(|(c, e)| odds(c.lost / c.asked) - e).collect()
-            })
+            .map(|(cells, e)| cells.iter().zip(e).map(|(c, e)| c.odds() - e).collect())
             .collect();
         let whiteners = views.iter().map(|v| Whitener::of(v, USUAL)).collect();
         let level = usual(&left).max(odds(0.0));

@@ -2,7 +2,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::cells::{Cell, odds};
+use super::cells::Cell;
+use super::odds::odds;
 use crate::camera::Camera;
 use crate::diagnose::views::known::KnownTerms;
 use crate::effects::logistic;
