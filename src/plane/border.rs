@@ -1,4 +1,6 @@
-//! Handles target edges that leave the picture at a slant.
+//! Lost pixels at the target's border: which lie on the target and which beside it.
+
+use std::ops::Range;
 
 use super::grow::Lattice;
 use super::image::InverseDepthImage;
@@ -37,4 +39,38 @@ pub(super) fn beside(
         }
     }
     reached
+}
+
+/// Widest gap of lost pixels that is bridged, px on either side.
+const GAP: usize = 2;
+
+/// Whether pixel `i` lies between two of `these` in its row or its column. Lost at random at the target's
+/// border, it is the target's all the same.
+pub(super) fn is_enclosed(
+    i: usize,
+    [width, height]: [usize; 2],
+    these: &impl Fn(usize) -> bool,
+) -> bool {
+    let (u, v) = (i % width, i / width);
+    let across = |mut us: Range<usize>| us.any(|u| these(v * width + u));
+    let along = |mut vs: Range<usize>| vs.any(|v| these(v * width + u));
+    let after = |at: usize, end: usize| at + 1..(at + 1 + GAP).min(end);
+    across(u.saturating_sub(GAP)..u) && across(after(u, width))
+        || along(v.saturating_sub(GAP)..v) && along(after(v, height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hole_in_the_border_is_the_targets_and_the_ground_beside_it_is_not() {
+        const SIZE: [usize; 2] = [9, 6];
+        // The left five columns, the last of them the border, with a hole of one pixel and one of two.
+        let holes = [13, 31, 40];
+        let these = |i: usize| i % 9 < 5 && !holes.contains(&i);
+        let enclosed: Vec<usize> =
+            (0..54).filter(|&i| !these(i) && is_enclosed(i, SIZE, &these)).collect();
+        assert_eq!(enclosed, holes);
+    }
 }

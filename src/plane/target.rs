@@ -1,7 +1,7 @@
 //! Finds the target's pixels: those of a region, or else of the plane at the principal point.
 
 use super::affine::AffineFit;
-use super::border::beside;
+use super::border::{beside, is_enclosed};
 use super::candidate::{Candidate, around_principal_point, candidate, centre_disc};
 use super::curved::curved_target;
 use super::grow::Lattice;
@@ -260,22 +260,23 @@ fn finish(
         ));
     }
     let beside = beside(image, lattice, &filled);
+    let fits = |i: usize| image.valid(i) && on_plane(image, &best.fit, i);
     let (mut pixels, mut on, mut edge) = (Vec::new(), 0, 0);
     for (i, beside) in beside.iter().enumerate() {
         let node = lattice.node_of(i, width);
         if !filled[node] || *beside || !in_front(image, &best.fit.plane, i) {
             continue;
         }
-        let fits = image.valid(i) && on_plane(image, &best.fit, i);
-        // Near the edge only pixels that fit: others may show something else.
-        if !core[node] && !fits {
+        // Near the edge only pixels that fit, or lost ones between those: others may show something else.
+        let lost = || !image.valid(i) && is_enclosed(i, [width, image.w.len() / width], &fits);
+        if !core[node] && !fits(i) && !lost() {
             continue;
         }
         if trimmed[node] || keep_edge {
             pixels.push(i as u32);
-            on += usize::from(fits);
+            on += usize::from(fits(i));
         } else {
-            edge += usize::from(fits);
+            edge += usize::from(fits(i));
         }
     }
     if on < MIN_PIXELS {

@@ -1,10 +1,12 @@
 //! Findings must follow the data: no structure, no finding; the same physics transformed, the same name; the
 //! recording's own extended model, nothing left.
 
+use std::cell::RefCell;
 use std::fs;
 use std::path::Path;
 
 use kinoise::{DepthCode, Plane, Seed};
+use rand::Rng;
 use rand::seq::SliceRandom;
 use serde_json::Value;
 
@@ -172,6 +174,30 @@ fn views_given_twice_make_no_mismatch() {
     twice(&disk);
     assert_eq!(disk.diagnosis().first(), "radial-disparity-bias");
     assert!(turned.is_empty(), "{turned:#?}");
+}
+
+/// Readings lost anywhere with the same chance follow no law, whether the target's region is given or found.
+#[test]
+fn readings_lost_at_random_are_no_mismatch() {
+    let mut told = Vec::new();
+    for (seed, chance) in (921..925).flat_map(|seed| [(seed, 0.005), (seed, 0.02)]) {
+        let disk = on_disk(order(Cell::Null, "", seed, 10, 4));
+        if seed % 2 == 0 {
+            let notes = views(&disk.recording).into_iter().map(|v| v.join("view.json"));
+            notes.filter(|f| f.exists()).for_each(|f| fs::remove_file(f).expect("removed"));
+        }
+        if disk.diagnosis().verdict() != "match" {
+            continue;
+        }
+        let rng = RefCell::new(Seed(seed).stream("losses"));
+        repaint(&disk.recording, |_, frame| {
+            let mut rng = rng.borrow_mut();
+            frame.raw.iter_mut().filter(|_| rng.random_bool(chance)).for_each(|raw| *raw = 0);
+        });
+        told.push((chance, disk.diagnosis().line()));
+    }
+    let wrong: Vec<_> = told.iter().filter(|(_, line)| line.contains("missing")).collect();
+    assert!(told.len() >= 6 && wrong.is_empty(), "{} sets, {wrong:#?}", told.len());
 }
 
 fn twice(disk: &OnDisk) {

@@ -44,8 +44,12 @@ pub struct Patch {
 pub fn cells(patches: &[Vec<Patch>], together: f64) -> Vec<Vec<Cell<'_>>> {
     fn of_view(view: &[Patch], together: f64) -> Vec<Cell<'_>> {
         let usual = usual_share(view);
-        let cell = |&Patch { ref place, lost, asked }| {
-            Cell { place, lost, asked, bias: bias(usual, asked, together), differs: false }
+        let cell = |&Patch { ref place, lost, asked }| Cell {
+            place,
+            lost,
+            asked,
+            bias: bias(usual, asked, together),
+            differs: false,
         };
         view.iter().map(cell).collect()
     }
