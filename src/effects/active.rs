@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::model;
 use crate::model::NoiseModel;
 use crate::rng::Seed;
-use crate::terms::ANYWHERE;
+use crate::terms::{ANYWHERE, Term};
 use crate::units::{shortest, to_digits};
 
 /// An effect that is switched on.
@@ -170,9 +170,12 @@ impl Active {
     /// JSON for a recipe: the formula's parameters, or the terms of the shape.
     pub fn described(&self) -> Value {
         let id = self.effect.card().id;
-        match self.effect.terms() {
-            [] => json!({"id": id, "parameters": self.parameters()}),
-            terms => json!({"id": id, "shape": terms}),
+        match &self.effect {
+            Acting::Catalogue(_) => json!({"id": id, "parameters": self.parameters()}),
+            Acting::Shape(shape) => {
+                let terms: Vec<&Term> = shape.terms.iter().map(|(term, _)| term).collect();
+                json!({"id": id, "shape": terms})
+            }
         }
     }
 

@@ -23,6 +23,7 @@ pub(super) static CARD: Card = Card {
     confused_with: "range-exponent, which does not go with the light of the room; intensity-dependent-noise: ambient light falls on the print as the pattern does, so that their ratio stays",
     reference: "Fankhauser et al. 2015",
     formula_error: 0.3,
+    rests_on_a_measurement: true,
     ..Card::BASE
 };
 
@@ -46,10 +47,6 @@ impl Effect for AmbientLight {
         let ratios = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0].into_iter();
         let lit = ratios.filter(|_| bounds.reach.ambient[1] > 0.0);
         lit.map(room).collect()
-    }
-
-    fn rests_on_a_measurement(&self) -> bool {
-        true
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {

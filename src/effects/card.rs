@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::USUAL_PX;
 use crate::sensors::SensorKind;
 
 /// Where in the light's path an effect acts, in order.
@@ -111,6 +112,13 @@ pub struct Card {
     /// Relative error of its parameters when a sensor follows another formula of the same physics (measured
     /// on ray-traced recordings).
     pub formula_error: f64,
+    /// Prior standard deviation of a shape's coefficients, in their unit.
+    pub usual: f64,
+    /// Least share of the best unnamed curve's gain that it must reach, where that is lower than for other
+    /// effects.
+    pub must_explain: Option<f64>,
+    /// Whether the axis that it follows was measured independently; it then wins ties.
+    pub rests_on_a_measurement: bool,
 }
 
 impl Card {
@@ -129,6 +137,9 @@ impl Card {
         reference: "",
         is_symptom: false,
         formula_error: 0.0,
+        usual: USUAL_PX,
+        must_explain: None,
+        rests_on_a_measurement: false,
     };
 
     /// Whether it can affect a camera of this kind; true where the kind is not known.

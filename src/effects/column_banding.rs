@@ -46,6 +46,8 @@ pub(super) static CARD: Card = Card {
     reference: "OpenNI property GmcMode: a correction in the read-out's steps of 1/8 px; 2 to 8 bands",
     is_symptom: true,
     formula_error: 0.3,
+    // On a real sensor the bands are superimposed on a smooth error of the column that is not part of them.
+    must_explain: Some(0.45),
     ..Card::BASE
 };
 
@@ -80,12 +82,6 @@ impl Effect for ColumnBanding {
             }
         }
         all
-    }
-
-    /// On a real sensor the bands are superimposed on a smooth error of the column that is not part of
-    /// them.
-    fn must_explain(&self) -> Option<f64> {
-        Some(0.45)
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {

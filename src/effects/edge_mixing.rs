@@ -1,6 +1,6 @@
 //! Depth mixes with the background at edges.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Kept, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Stage};
 use crate::terms::{Basis, Coordinate};
 
 pub struct EdgeMixing;
@@ -30,7 +30,7 @@ impl Effect for EdgeMixing {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let width = settings.at(0);
         let mixing = |e: &Exposure| offsets(e, width);
-        exposure.with_kept(Kept::Effect(CARD.id), mixing, |e, offsets| {
+        exposure.with_kept(CARD.id, mixing, |e, offsets| {
             e.depth.iter_mut().zip(offsets).for_each(|(z, offset)| *z += offset);
         });
     }

@@ -21,14 +21,6 @@ pub struct Instant {
     pub view_s: f64,
 }
 
-/// What is kept while the same is seen, by the effect's id: a model may hold the shape of an effect beside the
-/// effect itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kept {
-    Effect(&'static str),
-    Shape(&'static str),
-}
-
 /// A frame in progress. Arrays are per pixel, row-major; NaN means no value.
 pub struct Exposure<'a> {
     pub sensor: &'a Sensor,
@@ -52,18 +44,13 @@ pub struct Exposure<'a> {
     pub disparity: Vec<f32>,
     /// State that an effect keeps from frame to frame of a view, by its id; frames come in order.
     pub memory: HashMap<&'static str, Vec<f32>>,
-    /// Values that an effect derived from `seen` alone; dropped when something else is seen.
-    pub still: HashMap<Kept, Vec<f32>>,
+    /// Values that an effect derived from `seen` alone, by its id; dropped when something else is seen.
+    pub still: HashMap<&'static str, Vec<f32>>,
 }
 
 impl Exposure<'_> {
     pub fn pixels(&self) -> usize {
         self.depth.len()
-    }
-
-    /// fx * baseline, px m.
-    pub fn disparity_px_m(&self) -> f64 {
-        self.sensor.scale_px_m()
     }
 
     /// Column and row of a pixel.
@@ -105,12 +92,12 @@ impl Exposure<'_> {
     /// Calls `act` with what `make` returned when the sensor first saw what it sees now.
     pub fn with_kept(
         &mut self,
-        key: Kept,
+        id: &'static str,
         make: impl FnOnce(&Self) -> Vec<f32>,
         act: impl FnOnce(&mut Self, &[f32]),
     ) {
-        let kept = self.still.remove(&key).unwrap_or_else(|| make(self));
+        let kept = self.still.remove(id).unwrap_or_else(|| make(self));
         act(self, &kept);
-        self.still.insert(key, kept);
+        self.still.insert(id, kept);
     }
 }

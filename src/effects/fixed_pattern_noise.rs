@@ -1,6 +1,6 @@
 //! Each pixel has its own constant error.
 
-use super::{Card, Draw, Effect, Exposure, Kept, Parameter, Scope, Settings, Stage, normals};
+use super::{Card, Draw, Effect, Exposure, Parameter, Scope, Settings, Stage, normals};
 
 pub struct FixedPatternNoise;
 
@@ -27,7 +27,7 @@ impl Effect for FixedPatternNoise {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw) {
         let sigma = settings.at(0);
         let pattern = |e: &Exposure| normals(e.pixels(), draw.stream(Scope::Sensor, "pixels"));
-        exposure.with_kept(Kept::Effect(CARD.id), pattern, |e, own| {
+        exposure.with_kept(CARD.id, pattern, |e, own| {
             e.shift_disparity(|i| sigma * f64::from(own[i]));
         });
     }

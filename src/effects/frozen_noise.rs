@@ -1,6 +1,6 @@
 //! Laser speckle is static.
 
-use super::{Card, Draw, Effect, Exposure, Kept, Parameter, Scope, Settings, Stage, normals};
+use super::{Card, Draw, Effect, Exposure, Parameter, Scope, Settings, Stage, normals};
 
 pub struct FrozenNoise;
 
@@ -28,7 +28,7 @@ impl Effect for FrozenNoise {
         let fraction = settings.at(0);
         let (at_rest, alive) = (fraction.sqrt() as f32, (1.0 - fraction).sqrt() as f32);
         let grain = |e: &Exposure| normals(e.pixels(), draw.stream(Scope::View, "grain"));
-        exposure.with_kept(Kept::Effect(CARD.id), grain, |e, grain| {
+        exposure.with_kept(CARD.id, grain, |e, grain| {
             for (noise, grain) in e.noise.iter_mut().zip(grain) {
                 *noise = at_rest * grain + alive * *noise;
             }

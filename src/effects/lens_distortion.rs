@@ -1,6 +1,6 @@
 //! A pixel's ray is not the pinhole's.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
@@ -24,6 +24,9 @@ pub(super) static CARD: Card = Card {
     confused_with: "radial-disparity-bias, which is as large along rows as along columns; target-bow, which stays with the board",
     reference: "Brown 1966; Burrus, Kinect calibration: k1 = -0.26 before correction",
     formula_error: 0.03,
+    // Residual k1 of a calibrated depth picture (Khoshelham and Elberink 2012, table 1: 0.003; Smisek,
+    // Jancosek and Pajdla 2011: 0.01 to 0.05).
+    usual: 0.02,
     ..Card::BASE
 };
 
@@ -47,12 +50,6 @@ impl Effect for LensDistortion {
             }
         }
         all
-    }
-
-    /// Residual k1 of a calibrated depth picture (Khoshelham and Elberink 2012, table 1: 0.003; Smisek,
-    /// Jancosek and Pajdla 2011: 0.01 to 0.05).
-    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
-        0.02
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {

@@ -17,7 +17,7 @@ mod traces;
 pub use active::{Acting, Active};
 pub use card::{Card, Parameter, Settings, Stage};
 pub use draw::{Draw, Scope, fill_normal, logistic};
-pub use exposure::{Exposure, Instant, Kept};
+pub use exposure::{Exposure, Instant};
 pub use fitted::{Estimate, Fitted};
 pub use range_not_depth::RAY_FOR_DEPTH;
 pub use traces::{Bounds, Flat, Inverse, Known, Smallest};
@@ -41,37 +41,21 @@ pub trait Effect: Carded + Send + Sync {
     /// strength is not the card's identity.
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, draw: &Draw);
 
-    /// Fitted terms that replace a formula; none for the catalogue's effects.
-    fn terms(&self) -> &[Term] {
-        &[]
-    }
-
     /// Candidate basis functions: of the mean, px of disparity, or of the log variance, depending on the
     /// card's statistic. A diagnosis tries them all.
     fn shapes(&self, _: &Bounds) -> Vec<Basis> {
         Vec::new()
     }
 
-    /// Prior standard deviation of coefficient number `k` of one of its shapes, in its unit. `flat` is what
-    /// is stated about the target.
+    /// Prior standard deviation of coefficient number `k` of one of its shapes, in its unit: the card's,
+    /// unless it depends on these. `flat` is what is stated about the target.
     fn usual(&self, _shape: &Basis, _k: usize, _flat: Option<&Flat>) -> f64 {
-        USUAL_PX
+        self.card().usual
     }
 
     /// Whether a shape with these coefficients can be this effect, given what is stated about the target.
     fn agrees_with(&self, _flat: Option<&Flat>, _shape: &Basis, _coefficients: &[f64]) -> bool {
         true
-    }
-
-    /// Least share of the best unnamed curve's gain that this effect must reach, where that is lower than
-    /// for other effects.
-    fn must_explain(&self) -> Option<f64> {
-        None
-    }
-
-    /// Whether the axis that it follows was measured independently; it then wins ties.
-    fn rests_on_a_measurement(&self) -> bool {
-        false
     }
 
     /// Parameters of a fitted shape.

@@ -1,6 +1,6 @@
 //! The projector does not reach all that the camera sees.
 
-use super::{Card, Draw, Effect, Exposure, Kept, Parameter, Settings, Stage};
+use super::{Card, Draw, Effect, Exposure, Parameter, Settings, Stage};
 use crate::sensors::SensorKind;
 
 pub struct OcclusionShadow;
@@ -28,7 +28,7 @@ pub(super) static CARD: Card = Card {
 impl Effect for OcclusionShadow {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let share = settings.at(0) as f32;
-        exposure.with_kept(Kept::Effect(CARD.id), |e| shadow(e, share), |e, shadow| {
+        exposure.with_kept(CARD.id, |e| shadow(e, share), |e, shadow| {
             for (d, dark) in e.disparity.iter_mut().zip(shadow) {
                 if *dark > 0.0 {
                     *d = f32::NAN;
@@ -44,7 +44,7 @@ impl Effect for OcclusionShadow {
 /// point is u - d with the disparity d = fx b / z, so the shadow falls on the other side.
 fn shadow(exposure: &Exposure, share: f32) -> Vec<f32> {
     let seen = exposure.seen;
-    let scale = share * exposure.disparity_px_m() as f32;
+    let scale = share * exposure.sensor.scale_px_m() as f32;
     let rows = seen.depth.chunks_exact(seen.width).zip(seen.surface.chunks_exact(seen.width));
     let mut dark = Vec::with_capacity(seen.depth.len());
     for (depth, surface) in rows {

@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
@@ -28,6 +28,8 @@ pub(super) static CARD: Card = Card {
     reference: "Shimizu and Okutomi 2001, sub-pixel estimation error cancellation: 0.04 to 0.06 px for a 9 x 9 window on random dots",
     is_symptom: true,
     formula_error: 0.1,
+    // Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
+    usual: 0.1,
     ..Card::BASE
 };
 
@@ -51,11 +53,6 @@ impl Effect for PixelLocking {
         let half = ((OFF / step).ceil() as i64).clamp(1, 12);
         let period = |k: i64| 1.0 / (1.0 + OFF * k as f64 / half as f64);
         (-half..=half).map(|k| waves(period(k), 3)).collect()
-    }
-
-    /// Shimizu and Okutomi 2001: 0.06 px; without a remedy twice that.
-    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
-        0.1
     }
 
     fn estimates(&self, fit: &Fitted) -> Vec<Estimate> {

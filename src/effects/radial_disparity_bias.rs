@@ -1,6 +1,6 @@
 //! A bowl in disparity.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Term};
@@ -25,6 +25,8 @@ pub(super) static CARD: Card = Card {
     confused_with: "target-bow, which stays with the board and does not grow with z; lens-distortion, which a frontal plane does not show; range-not-depth, whose bowl grows with z and has no free size",
     reference: "Herrera, Kannala and Heikkila 2012: D(u,v) of the disparity; Teichman et al. 2013 (CLAMS)",
     formula_error: 0.1,
+    // Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px towards the corners.
+    usual: 0.5,
     ..Card::BASE
 };
 
@@ -42,12 +44,6 @@ impl Effect for RadialDisparityBias {
         const POWERS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
         let of = |orders: usize| POWERS.map(|power| bowl(power, orders));
         [of(2), of(4)].concat()
-    }
-
-    /// Herrera, Kannala and Heikkila 2012, fig. 6: up to 4 of a Kinect's steps of 1/8 px towards
-    /// the corners.
-    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
-        0.5
     }
 
     /// Nearest parabola at the geometric mean of the disparities.

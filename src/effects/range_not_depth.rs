@@ -40,11 +40,6 @@ impl Effect for RangeNotDepth {
         vec![RAY_FOR_DEPTH]
     }
 
-    /// All of it or nothing.
-    fn usual(&self, _: &Basis, _: usize, _: Option<&Flat>) -> f64 {
-        1.0
-    }
-
     /// A share lies between 0 and 1, or is -1 where the model assumes all of it and the sensor has none.
     /// Anything else is another bowl.
     fn agrees_with(&self, _: Option<&Flat>, _: &Basis, coefficients: &[f64]) -> bool {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Card, Carded, Draw, Effect, Exposure, Kept, Settings, Stage};
+use super::{Card, Carded, Draw, Effect, Exposure, Settings, Stage};
 use crate::plane::Plane;
 use crate::scene::Seen;
 use crate::stats::median_in_place;
@@ -12,9 +12,7 @@ use crate::terms::{LearntTerm, Needs, PixelContext, Pixels, Statistic, Term, edg
 /// at what each pixel sees undisturbed.
 pub struct Shape {
     card: &'static Card,
-    terms: Vec<Term>,
-    /// Disparities at which each was learnt, px.
-    learnt: Vec<[f64; 2]>,
+    pub(super) terms: Vec<LearntTerm>,
 }
 
 static BIAS: Card = Card {
@@ -22,10 +20,8 @@ static BIAS: Card = Card {
     title: "a measured bias without a formula",
     stage: Stage::Disparity,
     summary: "errors of the disparity as a fit found them, without a formula",
-    parameters: &[],
     statistic: "bias",
     axis: "pixel",
-    confused_with: "",
     reference: "the model",
     ..Card::BASE
 };
@@ -44,10 +40,8 @@ impl Shape {
     pub(super) fn of(terms: impl Iterator<Item = LearntTerm>) -> impl Iterator<Item = Shape> {
         let (bias, variance): (Vec<LearntTerm>, Vec<LearntTerm>) =
             terms.partition(|(t, _)| t.statistic == Statistic::Bias);
-        let shapes = [(&BIAS, bias), (&VARIANCE, variance)].map(|(card, terms)| {
-            let (terms, learnt) = terms.into_iter().unzip();
-            Shape { card, terms, learnt }
-        });
+        let shapes = [(&BIAS, bias), (&VARIANCE, variance)];
+        let shapes = shapes.map(|(card, terms)| Shape { card, terms });
         shapes.into_iter().filter(|s| !s.terms.is_empty())
     }
 
@@ -67,16 +61,11 @@ impl Carded for Shape {
 }
 
 impl Effect for Shape {
-    fn terms(&self) -> &[Term] {
-        &self.terms
-    }
-
     fn forward(&self, _: &Settings, exposure: &mut Exposure, _: &Draw) {
-        let learnt = self.terms.iter().zip(&self.learnt);
-        let (moving, still): (Vec<Learnt<'_>>, Vec<Learnt<'_>>) =
-            learnt.partition(|(t, _)| t.needs().session);
+        let (moving, still): (Vec<&LearntTerm>, Vec<&LearntTerm>) =
+            self.terms.iter().partition(|(t, _)| t.needs().session);
         let at_rest = |e: &Exposure| values(&still, e);
-        exposure.with_kept(Kept::Shape(self.card.id), at_rest, |exposure, at_rest| {
+        exposure.with_kept(self.card.id, at_rest, |exposure, at_rest| {
             if moving.is_empty() {
                 self.change(exposure, at_rest);
             } else {
@@ -108,10 +97,8 @@ fn rounding_variance(exposure: &Exposure) -> impl Fn(f32) -> f32 + use<> {
     }
 }
 
-type Learnt<'a> = (&'a Term, &'a [f64; 2]);
-
 /// Sum of the terms at each pixel; zero where nothing is seen.
-fn values(terms: &[Learnt<'_>], exposure: &Exposure) -> Vec<f32> {
+fn values(terms: &[&LearntTerm], exposure: &Exposure) -> Vec<f32> {
     let seen = exposure.seen;
     let mut sums = vec![0f32; seen.depth.len()];
     if terms.is_empty() {
@@ -127,7 +114,7 @@ fn values(terms: &[Learnt<'_>], exposure: &Exposure) -> Vec<f32> {
             }
             let place = scene.place(i);
             let applies = terms.iter().filter(|(t, _)| scene.knows(t, i));
-            *sum = applies.map(|(t, learnt)| t.held_value(**learnt, &place)).sum::<f64>() as f32;
+            *sum = applies.map(|(t, learnt)| t.held_value(*learnt, &place)).sum::<f64>() as f32;
         }
     });
     sums
@@ -147,7 +134,8 @@ struct Scene<'a> {
 impl<'a> Scene<'a> {
     fn of(exposure: &'a Exposure<'a>, needs: Needs) -> Self {
         let seen = exposure.seen;
-        let pixels = Pixels::new(&exposure.sensor.camera, exposure.rays, exposure.disparity_px_m());
+        let pixels =
+            Pixels::new(&exposure.sensor.camera, exposure.rays, exposure.sensor.scale_px_m());
         let on_target = |i: usize| seen.is_target(i) && !seen.depth[i].is_nan();
         let edge = if needs.board && seen.target.is_some() {
             let on: Vec<bool> = (0..seen.depth.len()).map(on_target).collect();

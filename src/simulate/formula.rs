@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::camera::Rays;
-use crate::effects::{Active, Exposure, Instant, Kept, ROOM_LUX, Stage, fill_normal};
+use crate::effects::{Active, Exposure, Instant, ROOM_LUX, Stage, fill_normal};
 use crate::frame::Frame;
 use crate::model::SigmaModel;
 use crate::rng::Seed;
@@ -33,7 +33,7 @@ pub struct Shooting<'a> {
     sigma: Vec<f32>,
     light: Vec<f32>,
     pub(super) memory: HashMap<&'static str, Vec<f32>>,
-    still: HashMap<Kept, Vec<f32>>,
+    still: HashMap<&'static str, Vec<f32>>,
 }
 
 impl FormulaSensor<'_> {
@@ -122,7 +122,7 @@ pub fn shoot(
 
 /// Adds the noise to the depth and converts it to the disparity that a matcher would find.
 fn match_up(exposure: &mut Exposure) {
-    let scale = exposure.disparity_px_m() as f32;
+    let scale = exposure.sensor.scale_px_m() as f32;
     exposure.disparity = exposure
         .depth
         .iter()
@@ -135,7 +135,7 @@ fn match_up(exposure: &mut Exposure) {
 }
 
 fn read_out(exposure: &mut Exposure) {
-    let scale = exposure.disparity_px_m() as f32;
+    let scale = exposure.sensor.scale_px_m() as f32;
     for (z, d) in exposure.depth.iter_mut().zip(&exposure.disparity) {
         *z = if *d > 0.0 { scale / d } else { f32::NAN };
     }

@@ -203,7 +203,7 @@ impl Choice<'_> {
     /// Whether its axis was measured for its own sake, as ambient light is; the light of the surface
     /// comes from an image that ambient light brightens too.
     fn rests_on_a_measurement(&self, i: usize) -> bool {
-        self.candidates[i].effect().is_some_and(|e| e.rests_on_a_measurement())
+        self.candidates[i].effect().is_some_and(|e| e.card().rests_on_a_measurement)
     }
 
     /// Share of the best curve's gain that a name must reach. It is higher for the sigma model, whose
@@ -213,7 +213,7 @@ impl Choice<'_> {
         if candidate.family == Some(RECALIBRATE) {
             return LAW_ADEQUATE.max(self.rules.adequacy);
         }
-        let own = candidate.effect().and_then(|e| e.must_explain());
+        let own = candidate.effect().and_then(|e| e.card().must_explain);
         own.map_or(self.rules.adequacy, |share| share.min(self.rules.adequacy))
     }
 }
