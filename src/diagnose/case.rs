@@ -51,8 +51,6 @@ pub struct Case<'a> {
     pub ranges: Option<Finding>,
     /// Finding made in single images; the steps were subtracted while reading.
     pub column_steps: Option<Finding>,
-    /// Views that the model's bias and its sigma were learnt from, where they differ from these.
-    pub learnt_from: [Option<Learnt>; 2],
     /// Whether the model includes what a first run found.
     pub extended: bool,
 }
@@ -65,14 +63,6 @@ pub struct MeanResult {
     pub lines: Vec<LearntLines>,
     /// The terms and the lines at every pixel, px.
     pub px: Vec<Vec<f32>>,
-}
-
-impl MeanResult {
-    /// Terms of the search, and of the lines.
-    pub fn all_terms(&self) -> Vec<Term> {
-        let lines = self.lines.iter().map(|l| &l.profile);
-        self.terms.iter().chain(lines).cloned().collect()
-    }
 }
 
 impl<'a> Case<'a> {
@@ -106,8 +96,7 @@ impl<'a> Case<'a> {
         progress.stage("comparing with the model");
         let lattice = lattice(&fields, recording);
         let kept = KeptPattern::of(&fields);
-        let learnt_from = learnt_from(model, &known, options, simulated.is_some());
-        let learnt = (learnt_from, &known);
+        let learnt = (learnt_from(model, &known, options, simulated.is_some()), &known);
         let survey = survey((&fields, &kept), &bench, baseline.as_ref(), options, learnt, model);
         Ok(Case {
             recording,
@@ -126,7 +115,6 @@ impl<'a> Case<'a> {
             remarks: copies,
             ranges,
             column_steps,
-            learnt_from,
             extended: false,
         })
     }
@@ -137,7 +125,7 @@ impl<'a> Case<'a> {
         'a: 'b,
     {
         let known = KnownTerms::of(model, &self.sensor().camera);
-        let learnt = (self.learnt_from, &known);
+        let learnt = (self.survey.learnt_from, &known);
         let weights = self.survey.weights();
         // Two surveys at once are a quarter of all memory.
         drop(self.survey);
@@ -220,7 +208,7 @@ impl<'a> Case<'a> {
     /// missed is allowed for.
     pub fn stands(&self, p: f64, level: f64) -> bool {
         let views = self.fields.len() as f64;
-        self.learnt_from[1].map_or(p, |model| model.p(p, views)) <= level
+        self.survey.learnt_from[1].map_or(p, |model| model.p(p, views)) <= level
     }
 
     /// Whether a finding stands despite its halves. Where the halves of the views do not agree, a curve or a

@@ -6,6 +6,7 @@ mod cholesky;
 pub use cholesky::Cholesky;
 
 use std::cell::RefCell;
+use std::marker::PhantomData;
 
 use argmin::core::{CostFunction, Error as ArgminError, Executor, Gradient, Hessian, State};
 use argmin::solver::brent::BrentOpt;
@@ -118,23 +119,14 @@ pub fn trust_region<P: LeastSquares>(
     })
 }
 
-struct Plain<F>(F);
+/// A function of a parameter `P`.
+struct Plain<P, F>(F, PhantomData<P>);
 
-impl<F: Fn(&[f64]) -> f64> CostFunction for Plain<F> {
-    type Param = Vec<f64>;
+impl<P, F: Fn(&P) -> f64> CostFunction for Plain<P, F> {
+    type Param = P;
     type Output = f64;
-    fn cost(&self, x: &Self::Param) -> Result<f64, ArgminError> {
+    fn cost(&self, x: &P) -> Result<f64, ArgminError> {
         Ok(finite_or_huge((self.0)(x)))
-    }
-}
-
-struct OfOne<F>(F);
-
-impl<F: Fn(f64) -> f64> CostFunction for OfOne<F> {
-    type Param = f64;
-    type Output = f64;
-    fn cost(&self, x: &f64) -> Result<f64, ArgminError> {
-        Ok(finite_or_huge((self.0)(*x)))
     }
 }
 
@@ -147,7 +139,7 @@ pub fn brent(
     max_steps: u64,
 ) -> Option<f64> {
     let solver = BrentOpt::new(low, high).set_tolerance(f64::EPSILON.sqrt(), tolerance);
-    let run = Executor::new(OfOne(cost), solver)
+    let run = Executor::new(Plain(|x: &f64| cost(*x), PhantomData::<f64>), solver)
         .configure(|state| state.max_iters(max_steps))
         .timer(false)
         .run();
@@ -170,7 +162,7 @@ pub fn nelder_mead(
     let Ok(solver) = NelderMead::new(simplex).with_sd_tolerance(1e-9) else {
         return start.to_vec();
     };
-    let run = Executor::new(Plain(cost), solver)
+    let run = Executor::new(Plain(|x: &Vec<f64>| cost(x), PhantomData::<Vec<f64>>), solver)
         .configure(|state| state.max_iters(max_steps))
         .timer(false)
         .run();

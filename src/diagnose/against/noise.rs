@@ -72,7 +72,8 @@ pub struct NoiseParts {
 }
 
 impl NoiseParts {
-    fn of(real: &[Structure], twins: &[Structure], level: f64) -> Option<Self> {
+    /// `None` where one of the parts can hardly be seen.
+    pub fn of(real: &[Structure], twins: &[Structure], level: f64) -> Option<Self> {
         let views: Vec<View> = real.iter().zip(twins).filter_map(|(r, t)| View::of(r, t)).collect();
         let mean = |of: fn(&View) -> f64| mean(&views, of);
         let (still, changing) = (mean(|v| v.still)?, mean(|v| v.changing)?);
@@ -160,11 +161,6 @@ fn mean(views: &[View], of: impl Fn(&View) -> f64) -> Option<ViewMean> {
 }
 
 impl Baseline {
-    /// Compares the parts of the noise; `None` where one of them can hardly be seen.
-    pub fn noise_parts(&self, real: &[Structure], level: f64) -> Option<NoiseParts> {
-        NoiseParts::of(real, &self.structure, level)
-    }
-
     /// Findings from the parts of the noise and from the infrared images.
     pub fn noise_findings(
         &self,

@@ -23,7 +23,6 @@ impl Baseline {
         real: &Quantisation,
         known: &mut KnownTerms,
     ) {
-        let ours = structure;
         let level = |of: &dyn Fn(&Structure) -> Option<f64>| {
             mean(self.structure.iter().filter_map(of)).unwrap_or(0.0)
         };
@@ -31,7 +30,7 @@ impl Baseline {
         let (fixed, rows) = (level(&|s| s.still.fixed_px2), level(&|s| s.row_px2));
         let columns = level(&|s| s.column_px2);
         let lags: [f64; 3] = std::array::from_fn(|k| level(&|s| s.lagged[k]));
-        for (s, twin) in ours.iter_mut().zip(&self.structure) {
+        for (s, twin) in structure.iter_mut().zip(&self.structure) {
             let differ = |real: &mut Option<f64>, twin: Option<f64>, level: f64| {
                 *real = real.zip(twin).map(|(r, t)| r - t + level);
             };
@@ -41,13 +40,9 @@ impl Baseline {
             // Nothing is known of columns: what both have must cancel.
             differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
             differ(&mut s.still.blotches_px2, twin.still.blotches_px2, 0.0);
-            for (real, twin) in s.still.lines_px2.iter_mut().zip(twin.still.lines_px2) {
-                differ(real, twin, 0.0);
-            }
-            s.frame_log_variance
-                .iter_mut()
-                .zip(twin.frame_log_variance)
-                .for_each(|(r, t)| differ(r, t, 0.0));
+            let lines = s.still.lines_px2.iter_mut().zip(twin.still.lines_px2);
+            let frames = s.frame_log_variance.iter_mut().zip(twin.frame_log_variance);
+            lines.chain(frames).for_each(|(real, twin)| differ(real, twin, 0.0));
             for (k, lag) in lags.iter().enumerate() {
                 if twin.lagged[k].is_some() {
                     differ(&mut s.lagged[k], twin.lagged[k], *lag);

@@ -1,7 +1,6 @@
 //! Checks of the findings: held-out views, replication in halves, a second run, excess terms of the model,
 //! and power.
 
-pub mod ablation;
 pub mod again;
 pub mod far_off;
 pub mod heldout;

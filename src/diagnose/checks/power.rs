@@ -7,7 +7,7 @@
 //! errors of the fitted coefficients cost.
 
 use nalgebra::DVector;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::Detectable;
@@ -27,7 +27,7 @@ use crate::diagnose::search::variance::beyond_sigma;
 use crate::diagnose::views::samples::ViewData;
 use crate::effects::{self, Smallest};
 use crate::solve::Cholesky;
-use crate::terms::{Basis, Statistic, Term};
+use crate::terms::{Basis, Term};
 
 /// A layer as it was searched.
 pub struct DetectionCriteria<'a> {
@@ -89,13 +89,10 @@ impl DetectionCriteria<'_> {
 fn gain_of_one(views: &[Evidence], u: &DVector<f64>, prior: f64) -> Option<f64> {
     let m = views.first()?.b.len() - u.len();
     let seen = |v: &Evidence| Evidence { a: v.a.clone(), b: v.a.columns(m, u.len()) * u };
-    let whole: Vec<Evidence> = views.iter().map(seen).collect();
-    let part = |v: &Evidence| Evidence {
-        a: v.a.view((0, 0), (m, m)).into_owned(),
-        b: v.b.rows(0, m).into_owned(),
-    };
-    let beside: Vec<Evidence> = whole.iter().map(part).collect();
-    Some(gain(&whole, prior)?.total - gain(&beside, prior)?.total)
+    let mut whole: Vec<Evidence> = views.iter().map(seen).collect();
+    let with = gain(&whole, prior)?.total;
+    whole.iter_mut().for_each(|e| e.truncate(m));
+    Some(with - gain(&whole, prior)?.total)
 }
 
 /// Mean loss of the coefficients' own errors where each view is predicted from the others, in nats at a
@@ -128,26 +125,21 @@ impl Case<'_> {
         };
         let bounds = survey.bounds(camera);
         let mut all = Vec::new();
-        for (statistic, gates) in [(Statistic::Bias, &of_mean), (Statistic::Variance, &of_size)] {
+        for gates in [&of_mean, &of_size] {
+            let statistic = gates.scene.statistic;
             let can = effects::that_change(statistic).into_iter();
             for effect in can.filter(|e| e.card().applies_to(bounds.kind)) {
-                let smallest = effect.smallest(&bounds).and_then(|s| min_size(s, statistic, gates));
-                all.extend(
-                    smallest.map(|minimum| Detectable { effect: effect.card().id, minimum }),
-                );
+                let Some(Smallest { parameter, shape, unit, of }) = effect.smallest(&bounds) else {
+                    continue;
+                };
+                let term = Term { statistic, basis: shape, coefficients: unit };
+                let size = gates.min_size(&term).map(of).filter(|size| size.is_finite());
+                all.extend(size.map(|size| Detectable {
+                    effect: effect.card().id,
+                    minimum: Map::from_iter([(parameter.to_string(), json!(size))]),
+                }));
             }
         }
         all
     }
-}
-
-fn min_size(
-    smallest: Smallest,
-    statistic: Statistic,
-    gates: &DetectionCriteria<'_>,
-) -> Option<Map<String, Value>> {
-    let Smallest { parameter, shape, unit, of } = smallest;
-    let term = Term { statistic, basis: shape, coefficients: unit };
-    let min_size = gates.min_size(&term).map(of).filter(|min_size| min_size.is_finite())?;
-    Some(Map::from_iter([(parameter.to_string(), json!(min_size))]))
 }

@@ -16,17 +16,13 @@ pub fn rms(views: &[SurveyedView], terms: &[Term], scale_px_m: f64, less_px2: f6
     for view in views {
         each_patch(view, terms, |(place, t), f| {
             let to_mm = 1e3 * place.z * place.z / scale_px_m;
-            px += squares_about(t, f);
+            // Squares of the patch's readings about `f`.
+            px += t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0);
             mm += t.pixels * ((t.mean - f) * to_mm).powi(2);
             n += t.pixels;
         });
     }
     [((px - less_px2).max(0.0) / n).sqrt(), (mm / n).sqrt()]
-}
-
-/// Sum of squares of a patch's readings about `f`, px^2.
-fn squares_about(t: &Tile, f: f64) -> f64 {
-    t.pixels * (t.square - 2.0 * f * t.mean + f * f).max(0.0)
 }
 
 /// Change in each view's disparity on the optical axis once the terms are subtracted, px.
@@ -37,18 +33,6 @@ pub fn levels(survey: &Survey, terms: &[Term]) -> Vec<f64> {
 
 fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
     view.places.iter().map(|place| Term::sum(terms, place)).collect()
-}
-
-/// Values of the terms at the patches, with the plane fitted anew.
-fn fitted(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
-    let mut values = values(view, terms);
-    // What the terms leave has a plane of its own, which is subtracted with them.
-    if let Some(plane) = plane_left(view, &values) {
-        for (place, f) in view.places.iter().zip(&mut values) {
-            *f += plane[0] + plane[1] * place.x + plane[2] * place.y;
-        }
-    }
-    values
 }
 
 /// Plane left in a view's means without these values.
@@ -63,9 +47,13 @@ fn each_patch(
     terms: &[Term],
     mut visit: impl FnMut((&PixelContext, &Tile), f64),
 ) {
-    let fitted = fitted(view, terms);
-    let patches = view.patches().zip(fitted).filter(|((_, t), _)| t.mean.is_finite());
-    patches.for_each(|(patch, f)| visit(patch, f));
+    let values = values(view, terms);
+    // What the terms leave has a plane of its own, which is subtracted with them.
+    let plane = plane_left(view, &values);
+    for ((p, t), f) in view.patches().zip(values).filter(|((_, t), _)| t.mean.is_finite()) {
+        let f = plane.map_or(f, |plane| f + (plane[0] + plane[1] * p.x + plane[2] * p.y));
+        visit((p, t), f);
+    }
 }
 
 /// RMS of each view's mean residual with the terms subtracted, px.

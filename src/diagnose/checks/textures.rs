@@ -136,10 +136,7 @@ pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
             let own = Mixture::of(known).map_or(GAUSSIAN_TAIL, |m| m.tail(1.0, 0.0));
             Box::new(move |s| Some(s.tail_share()? - own))
         }
-        "frame-jitter" => Box::new(move |s| {
-            let j = s.jitter?;
-            Some(j.scatter_px2 / j.freedom - j.expected_px2 - px2)
-        }),
+        "frame-jitter" => Box::new(move |s| Some(s.jitter?.about.beyond() - px2)),
         _ => return None,
     })
 }

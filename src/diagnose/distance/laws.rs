@@ -39,15 +39,6 @@ pub const MIN_VIEWS: usize = 5;
 /// Time constants of a warm-up, s.
 const WARM_UPS: [f64; 6] = [60.0, 180.0, 480.0, 1200.0, 2400.0, 7200.0];
 
-/// Other effects on the distances.
-#[derive(Default)]
-pub struct Nuisances {
-    /// Distance between a bent target and the place on it that was measured, the same at all distances, m.
-    pub bent_m: f64,
-    /// Biases with an undetermined constant, which cannot be told from an offset of the disparity.
-    pub open: Vec<Family>,
-}
-
 /// Views with a reference, and the nuisance columns fitted beside every law.
 struct References<'a> {
     checked: &'a [ReferencedView],
@@ -57,9 +48,9 @@ struct References<'a> {
 }
 
 impl<'a> References<'a> {
-    fn of(checked: &'a [ReferencedView], Nuisances { bent_m, open }: &Nuisances) -> Self {
+    fn of(checked: &'a [ReferencedView], bent_m: f64, open: &[Family]) -> Self {
         let angles = if is_tilted(checked) { 2 } else { 0 };
-        let bent = (*bent_m > 0.0).then_some(*bent_m);
+        let bent = (bent_m > 0.0).then_some(bent_m);
         let others = |c: &ReferencedView| -> Vec<f64> {
             let angles = c.slope[..angles].iter().map(|s| c.z * s);
             angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
@@ -124,14 +115,16 @@ impl<'a> References<'a> {
     }
 }
 
-/// Fits all laws, with their gains on references left out; none where there are too few references.
-pub fn laws(checked: &[ReferencedView], nuisances: &Nuisances) -> Vec<Law> {
+/// Fits all laws, with their gains on references left out; none where there are too few references. `bent_m`
+/// lie between a bent target and the place on it that was measured, at all distances; `open` are biases with an
+/// undetermined constant, which cannot be told from an offset of the disparity.
+pub fn laws(checked: &[ReferencedView], bent_m: f64, open: &[Family]) -> Vec<Law> {
     if checked.len() < MIN_VIEWS {
         return Vec::new();
     }
-    let mut references = References::of(checked, nuisances);
+    let mut references = References::of(checked, bent_m, open);
     let mut laws = Vec::from_iter(references.law("depth-scale", Axis::Z, |c| c.without_law()));
-    if nuisances.open.is_empty() {
+    if open.is_empty() {
         laws.extend(references.law("disparity-offset", Axis::Z, ReferencedView::moved_by_a_px));
     }
     laws.extend(WARM_UPS.iter().filter_map(|tau| {

@@ -45,7 +45,7 @@ fn references(
 
 /// Names found and their offsets, px, beside a target bent by this much.
 fn found(checked: &[ReferencedView], bent_m: f64) -> Vec<(Option<&'static str>, f64)> {
-    let laws = laws(checked, &Nuisances { bent_m, ..Nuisances::default() });
+    let laws = laws(checked, bent_m, &[]);
     let found = findings(&laws, &KnownTerms::default(), 1.0, 0.003, Seed(1));
     found.iter().map(|f| (f.effect, f.value("offset_px").unwrap_or(f64::NAN))).collect()
 }
@@ -92,7 +92,7 @@ fn a_large_law_has_its_own_size() {
             }
         };
         let checked: Vec<ReferencedView> = (0..24).map(of).collect();
-        let told = laws(&checked, &Nuisances::default());
+        let told = laws(&checked, 0.0, &[]);
         let [size, error] = told.iter().find(|l| l.family == family).unwrap().estimate;
         assert!((size - truth).abs() < 3.0 * error, "{family}: {size} +- {error}");
         assert!(error < 0.01 * truth, "{family}: {error}");

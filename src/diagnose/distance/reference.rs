@@ -1,6 +1,6 @@
 //! Offset, scale and drift, which planes alone cannot determine, from distances measured by other means.
 
-use super::laws::{Law, MIN_VIEWS, Nuisances, laws};
+use super::laws::{Law, MIN_VIEWS, laws};
 use super::referenced_view::referenced_views;
 use crate::diagnose::case::Case;
 use crate::diagnose::checks::overstated::SHARE;
@@ -152,13 +152,14 @@ impl Case<'_> {
         let views = self.fields.len() as f64;
         // The levels carry the error of the model's bias, and its own references, if any, leave a law
         // uncertain.
-        let of_bias = self.learnt_from[0].map(|l| l.of_difference(views));
-        let theirs = Learnt::references(self.model).filter(|_| self.learnt_from[1].is_some());
+        let of_bias = self.survey.learnt_from[0].map(|l| l.of_difference(views));
+        let theirs =
+            Learnt::references(self.model).filter(|_| self.survey.learnt_from[1].is_some());
         let of_laws = theirs.map(|l| l.excess(ours as f64));
         let excess = of_bias.unwrap_or(1.0).max(of_laws.unwrap_or(1.0));
-        let found = |terms: &[Term], beside: &Nuisances| {
+        let found = |terms: &[Term], open: &[Family]| {
             let checked = referenced_views(&self.fields, &self.survey, terms, &self.known);
-            let mut laws = laws(&checked, beside);
+            let mut laws = laws(&checked, bent_m, open);
             laws.retain(|l| can_happen(l.family, self.sensor().kind));
             let level = self.level(Self::LAWS_LEVEL);
             findings(&laws, &self.known, excess, level, self.options.seed)
@@ -166,7 +167,7 @@ impl Case<'_> {
         // A bowl moves the plane on the axis too, by an unknown constant.
         let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
         if !open.is_empty() {
-            let laws = found(bias, &Nuisances { bent_m, open });
+            let laws = found(bias, &open);
             if !laws.is_empty() {
                 return laws;
             }
@@ -175,11 +176,10 @@ impl Case<'_> {
         // or the model's.
         let model = self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead());
         let model: Vec<Term> = model.map(|t| t.times(-1.0)).collect();
-        let closed = Nuisances { bent_m, open: Vec::new() };
-        let mut laws = found(&plain, &closed);
+        let mut laws = found(&plain, &[]);
         for others in [anchored.clone(), bias.to_vec(), [anchored, model].concat()] {
             if others != plain && !laws.is_empty() {
-                let with = found(&others, &closed);
+                let with = found(&others, &[]);
                 laws.retain(|l| with.iter().any(|w| w.effect == l.effect));
             }
         }

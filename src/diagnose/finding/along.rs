@@ -17,14 +17,13 @@ impl Along {
     pub fn of(scene: &Scene<'_>, basis: &Basis) -> Self {
         let axis = basis.axis();
         let corner = scene.corner_px;
+        let over = if let Basis::Curve { over, .. } = basis { Some(*over) } else { None };
         let (label, value): (&'static str, OfPlace) = match axis {
             Axis::Z => ("depth, m", Box::new(|p| p.z)),
             Axis::DisparityPhase => {
                 let period = basis.period().unwrap_or(1.0);
-                (
-                    "fraction of a pixel of disparity",
-                    Box::new(move |p| (p.disparity / period).rem_euclid(1.0)),
-                )
+                let phase = move |p: &PixelContext| (p.disparity / period).rem_euclid(1.0);
+                ("fraction of a pixel of disparity", Box::new(phase))
             }
             Axis::Column => ("column, px", Box::new(|p| p.u)),
             Axis::Row => ("row, px", Box::new(|p| p.v)),
@@ -32,19 +31,15 @@ impl Along {
                 ("distance from the image centre, px", Box::new(move |p| p.radius * corner))
             }
             Axis::Theta => ("tilt, rad", Box::new(|p| p.theta)),
-            Axis::Azimuth => match basis {
-                Basis::Curve { over: Coordinate::Along, .. } => {
-                    let along = Box::new(|p: &PixelContext| Coordinate::Along.value(p));
-                    ("from the optical axis along the tilt, ray", along)
-                }
-                _ => ("direction of the tilt, rad", Box::new(|p| p.azimuth)),
-            },
-            Axis::TargetPosition => match basis {
-                Basis::Curve { over: Coordinate::Down, .. } => {
-                    ("down on the board, m", Box::new(|p| p.down))
-                }
-                _ => ("right on the board, m", Box::new(|p| p.right)),
-            },
+            Axis::Azimuth if over == Some(Coordinate::Along) => {
+                let along = |p: &PixelContext| Coordinate::Along.value(p);
+                ("from the optical axis along the tilt, ray", Box::new(along))
+            }
+            Axis::Azimuth => ("direction of the tilt, rad", Box::new(|p| p.azimuth)),
+            Axis::TargetPosition if over == Some(Coordinate::Down) => {
+                ("down on the board, m", Box::new(|p| p.down))
+            }
+            Axis::TargetPosition => ("right on the board, m", Box::new(|p| p.right)),
             Axis::EdgeDistance => ("distance from the target's edge, px", Box::new(|p| p.edge)),
             Axis::Intensity => {
                 ("infrared light of the surface, of the median", Box::new(|p| p.light))
@@ -102,18 +97,11 @@ impl Along {
                 }
             }
         }
-        let mut curve = Curve {
-            x_label: self.label.into(),
-            y_label: if scene.statistic == Statistic::Bias {
-                "disparity error, px".into()
-            } else {
-                "noise over the model's".into()
-            },
-            ..Curve::default()
-        };
-        let show = |y: f64| {
-            if scene.statistic == Statistic::Bias { y } else { (0.5 * y).exp() }
-        };
+        let of_mean = scene.statistic == Statistic::Bias;
+        let y_label = if of_mean { "disparity error, px" } else { "noise over the model's" };
+        let (x_label, y_label) = (self.label.into(), y_label.into());
+        let mut curve = Curve { x_label, y_label, ..Curve::default() };
+        let show = |y: f64| if of_mean { y } else { (0.5 * y).exp() };
         for b in 0..BINS {
             let total: f64 = by_view.iter().map(|s| s[b][0]).sum();
             if total <= 0.0 {
@@ -125,11 +113,7 @@ impl Along {
             let error = scatter.sqrt() / total;
             curve.x.push(by_view.iter().map(|s| s[b][3]).sum::<f64>() / total);
             curve.y.push(show(mean));
-            curve.y_std_error.push(if scene.statistic == Statistic::Bias {
-                error
-            } else {
-                0.5 * error * show(mean)
-            });
+            curve.y_std_error.push(if of_mean { error } else { 0.5 * error * show(mean) });
             curve.model.push(show(model));
         }
         curve

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::camera::Camera;
 use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::outcome::Chosen;
+use crate::diagnose::search::prepared::fill_all;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
 
@@ -171,7 +172,7 @@ impl Columns {
     fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
         let (terms, others) = row.split_at_mut(self.terms);
         let (nodes, affine) = others.split_at_mut(2 * SPLINES);
-        self.fill_terms(place, terms);
+        fill_all(&self.bases, place, terms);
         let mut begins = 0;
         for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(SPLINES)) {
             let mut k = 0;
@@ -187,19 +188,10 @@ impl Columns {
         begins
     }
 
-    fn fill_terms(&self, place: &PixelContext, row: &mut [f64]) {
-        let mut rest = row;
-        for basis in &self.bases {
-            let (mine, others) = rest.split_at_mut(basis.count());
-            basis.fill(place, mine);
-            rest = others;
-        }
-    }
-
     /// Fills all columns at a place, the terms without what planes absorb of them.
     pub fn fill(&self, place: &PixelContext, row: &mut [f64]) {
         let (terms, nodes) = row.split_at_mut(self.terms);
-        self.fill_terms(place, terms);
+        fill_all(&self.bases, place, terms);
         for (term, gauge) in self.gauges.iter().enumerate() {
             let mine = &mut terms[self.span(term)];
             gauge.iter().for_each(|gauge| gauge.take_out(place, mine));

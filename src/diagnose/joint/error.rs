@@ -11,6 +11,7 @@ use super::fit::Joint;
 use super::terms::{Settled, System};
 use crate::camera::Camera;
 use crate::diagnose::checks::replication::spans;
+use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::solve::Cholesky;
 use crate::terms::Pixels;
@@ -32,7 +33,7 @@ const ROUNDS: usize = 4;
 const SPARE: usize = 8;
 
 impl Joint<'_> {
-    /// Covariance of all columns' coefficients, approximated for planes at these disparities, px.
+    /// Covariance of the coefficients of [`Joint::chosen`], approximated for planes at these disparities, px.
     /// `left` are the scores that the fit leaves in each view: views scatter beyond their noise, and
     /// the posterior is as much wider.
     pub fn error(
@@ -42,7 +43,7 @@ impl Joint<'_> {
         precision: &DVector<f64>,
         left: &[DVector<f64>],
         (camera, disparities): (&Camera, [f64; 3]),
-    ) -> Option<Error> {
+    ) -> Option<Covariance> {
         let System { columns: places, held } = self.system(s, kept, precision);
         let n = places.len();
         let information = DMatrix::from_fn(n, n, |i, j| self.all.a[(places[i], places[j])]);
@@ -75,9 +76,10 @@ impl Joint<'_> {
             places.iter().enumerate().for_each(|(i, &k)| all[k] = of(i));
             all
         };
-        Some(Error {
-            variances: all(&|i| own[i]),
-            factors: factors.iter().map(|f| all(&|i| f[i])).collect(),
+        Some(Covariance {
+            factors: factors.iter().map(|f| self.reported(s, &all(&|i| f[i]))).collect(),
+            variances: self.laid_out(s, &all(&|i| own[i]), |_, _| [0.0; 3]),
+            ..Covariance::default()
         })
     }
 
@@ -115,13 +117,6 @@ impl Joint<'_> {
         };
         disparities.into_par_iter().flat_map(lines).flat_map_iter(of_line).collect()
     }
-}
-
-/// A covariance: the sum of the factors' outer products, plus independent variances of the
-/// coefficients.
-pub struct Error {
-    pub factors: Vec<DVector<f64>>,
-    pub variances: DVector<f64>,
 }
 
 /// Nonzero columns at a pixel.

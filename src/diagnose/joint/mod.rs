@@ -21,10 +21,9 @@ use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::Gain;
 use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
-use crate::model::Covariance;
 use crate::terms::Gauge;
 use columns::Columns;
-use error::{Error, clustered};
+use error::clustered;
 use fit::{Joint, Reduced};
 use terms::{Settled, System, is_rough, total};
 
@@ -109,7 +108,7 @@ impl Joint<'_> {
         let planes = (camera, disparities(self.data));
         let is_told = second.contains(&true);
         let (halves, error) = rayon::join(
-            || self.halves(second, s, &precision, &beta),
+            || is_told.then(|| self.halves(second, s, &precision, &beta)).flatten(),
             || is_told.then(|| self.error(s, &kept, &precision, &left, planes)).flatten(),
         );
         let told = self.reported(s, &beta);
@@ -125,19 +124,10 @@ impl Joint<'_> {
             looks: found.looks.clone(),
             noise: found.noise.clone(),
             halves,
-            covariance: error.map(|e| self.reported_error(s, &e)).unwrap_or_default(),
+            covariance: error.unwrap_or_default(),
             fit: Some(fit),
             ..Outcome::default()
         })
-    }
-
-    /// An error laid out like the coefficients of [`Joint::reported`].
-    fn reported_error(&self, s: &Settled, error: &Error) -> Covariance {
-        Covariance {
-            factors: error.factors.iter().map(|f| self.reported(s, f)).collect(),
-            variances: self.laid_out(s, &error.variances, |_, _| [0.0; 3]),
-            ..Covariance::default()
-        }
     }
 
     /// The terms' covariance, laid out like the coefficients of [`Joint::reported`]; zero elsewhere.
@@ -147,27 +137,18 @@ impl Joint<'_> {
         errors: &DMatrix<f64>,
         told: usize,
     ) -> DMatrix<f64> {
-        let mut covariance = DMatrix::zeros(told, told);
-        let mut to = 0;
-        let places: Vec<usize> = s
-            .terms
-            .iter()
-            .flat_map(|&t| {
-                let (count, gauge) = (self.columns.bases[t].count(), &self.columns.gauges[t]);
-                let first = to;
-                to += count + if gauge.is_some() { 3 } else { 0 };
-                first..first + count
-            })
-            .collect();
-        for (i, &p) in places.iter().enumerate() {
-            for (j, &q) in places.iter().enumerate() {
-                covariance[(p, q)] = errors[(i, j)];
+        let (mut covariance, mut to) = (errors.clone(), 0);
+        for &t in &s.terms {
+            to += self.columns.bases[t].count();
+            if self.columns.gauges[t].is_some() {
+                covariance = covariance.insert_rows(to, 3, 0.0).insert_columns(to, 3, 0.0);
+                to += 3;
             }
         }
-        covariance
+        covariance.resize(told, told, 0.0)
     }
 
-    /// Fits the same system to each half of the views, where there are two.
+    /// Fits the same system to each half of the views.
     fn halves(
         &self,
         second: &[bool],
@@ -175,9 +156,6 @@ impl Joint<'_> {
         precision: &DVector<f64>,
         whole: &DVector<f64>,
     ) -> Option<Halves> {
-        if !second.contains(&true) {
-            return None;
-        }
         let kept = self.kept(&s.terms);
         let System { columns, held } = self.system(s, &kept, precision);
         let n = columns.len();

@@ -242,7 +242,8 @@ impl Scatter {
             slope: (few * mean(1)).max(min.slope),
             cell: mean(2).max(min.cell),
             differing: mean(3).max(min.differing),
-            clump: neighbours.size().max(min.clump),
+            // Cells that count as one.
+            clump: (1.0 + neighbours.more()).max(min.clump),
         }
     }
 }
@@ -295,10 +296,5 @@ impl Neighbours {
     pub fn more(&self) -> f64 {
         let rho = self.product / self.pairs.max(1.0) * self.cells / self.square.max(1e-12);
         8.0 * rho.clamp(0.0, 1.0)
-    }
-
-    /// Cells that count as one.
-    fn size(&self) -> f64 {
-        1.0 + self.more()
     }
 }

@@ -39,7 +39,7 @@ impl Problem<'_> {
     fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
         let step = self.step(x);
         let of = |p: &Point| misfit(p, step.loss(p.x, self.base));
-        let held = self.allowed.map(|a| a.untypical(&step));
+        let held = self.allowed.map(|a| a.untypical(step.width.abs()));
         let all: Vec<f64> = self.points.iter().map(of).chain(held).collect();
         DVector::from_vec(all)
     }

@@ -37,13 +37,10 @@ const NARROWEST_EDGE: f64 = 1e-4;
 /// RMS deviations of middle and width from those `reported`. `scatter` is the dispersion of the points: their
 /// variance over what is expected.
 pub fn errors(reported: &Step, base: f64, points: &[Point], scatter: f64) -> Option<[f64; 2]> {
-    let Allowed { middles, widths, typical } = allowed(reported)?;
+    let allowed = &allowed(reported)?;
     let rising =
-        |rise: &fn(f64) -> f64| Rising { reported, base, points, scatter, typical, rise: *rise };
-    let nodes: Vec<Node> = RISES
-        .par_iter()
-        .flat_map_iter(|rise| rising(rise).nodes(middles, widths.map(f64::ln)))
-        .collect();
+        |rise: &fn(f64) -> f64| Rising { reported, base, points, scatter, allowed, rise: *rise };
+    let nodes: Vec<Node> = RISES.par_iter().flat_map_iter(|rise| rising(rise).nodes()).collect();
     let posterior = Posterior::of(nodes, |n| (-n.misfit, n.area))?;
     let of_middle = posterior.rms(|n| n.middle - reported.middle);
     let errors = [of_middle, posterior.rms(|n| n.width - reported.width.abs())];
@@ -64,15 +61,10 @@ impl Allowed {
             && within(step.width.abs(), [NARROWEST_EDGE, self.widths[1]])
     }
 
-    /// See [`untypical`].
-    pub fn untypical(&self, step: &Step) -> f64 {
-        untypical(step.width.abs(), self.typical)
+    /// Deviation of a width from the typical one, in standard deviations; a factor of e is one.
+    pub fn untypical(&self, width: f64) -> f64 {
+        (width / self.typical).ln()
     }
-}
-
-/// Deviation of a width from the typical one, in standard deviations; a factor of e is one.
-fn untypical(width: f64, typical: f64) -> f64 {
-    (width / typical).ln()
 }
 
 /// Returns what the catalogue allows for such a step.
@@ -104,7 +96,7 @@ struct Rising<'a> {
     base: f64,
     points: &'a [Point],
     scatter: f64,
-    typical: f64,
+    allowed: &'a Allowed,
     rise: fn(f64) -> f64,
 }
 
@@ -113,7 +105,7 @@ impl Rising<'_> {
     fn misfit(&self, middle: f64, width: f64, limit: f64) -> f64 {
         let lost = self.reported.share * (1.0 - self.base);
         let toward = self.reported.width.signum() / width;
-        let mut sum = 0.5 * untypical(width, self.typical).powi(2);
+        let mut sum = 0.5 * self.allowed.untypical(width).powi(2);
         for p in self.points {
             let loss = self.base + lost * (self.rise)((p.x - middle) * toward);
             sum += 0.5 * misfit(p, loss).powi(2) / self.scatter;
@@ -125,9 +117,10 @@ impl Rising<'_> {
     }
 
     /// Nodes of the last grid that are not negligible.
-    fn nodes(&self, middles: [f64; 2], logs: [f64; 2]) -> Vec<Node> {
+    fn nodes(&self) -> Vec<Node> {
+        let Allowed { middles, widths, .. } = *self.allowed;
         let mut across = around(self.reported.middle, self.reported.width.abs(), middles);
-        let mut along: Vec<f64> = even(logs, NODES).collect();
+        let mut along: Vec<f64> = even(widths.map(f64::ln), NODES).collect();
         let mut nodes = Vec::new();
         for _ in 0..ROUNDS {
             let mut best = f64::INFINITY;

@@ -64,7 +64,7 @@ impl HardEnd {
         let mut points = (look.points)([middle - close, middle + close]);
         points.sort_by(|a, b| (a.x * limit).total_cmp(&(b.x * limit)));
         let lost = |p: &Point| ((p.share - base) / (1.0 - base)).max(0.0) * p.asked;
-        let Cut { z_m, before, measured } = best_cut(&points, lost)?;
+        let (z_m, before, measured) = best_cut(&points, lost)?;
         let edge = Step::whole(Axis::Z, z_m, limit);
         let of_edge =
             |p: &Point| p.asked * edge.loss(z_m - limit.signum() * (p.x - z_m).abs(), 0.0);
@@ -109,26 +109,18 @@ impl HardEnd {
     }
 }
 
-/// A depth, and the pixel-frames on its wrong side: lost before it, or measured beyond it.
-struct Cut {
-    z_m: f64,
-    before: f64,
-    measured: f64,
-}
-
-/// The cut with the fewest of them, between two consecutive points.
-fn best_cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<Cut> {
-    let measured = points.iter().map(|p| p.asked - lost(p)).sum();
-    let mut best = Cut { z_m: points.first()?.x, before: 0.0, measured };
-    let (mut before, mut measured) = (0.0, measured);
-    for pair in points.windows(2) {
+/// The depth, of the first point or between two consecutive ones, with the fewest pixel-frames on its wrong
+/// side, and their numbers: lost before it, and measured beyond it.
+fn best_cut(points: &[Point], lost: impl Fn(&Point) -> f64) -> Option<(f64, f64, f64)> {
+    let (mut before, mut beyond): (f64, f64) =
+        (0.0, points.iter().map(|p| p.asked - lost(p)).sum());
+    let first = (points.first()?.x, before, beyond);
+    let cuts = points.windows(2).map(|pair| {
         before += lost(&pair[0]);
-        measured -= pair[0].asked - lost(&pair[0]);
-        if before + measured < best.before + best.measured {
-            best = Cut { z_m: 0.5 * (pair[0].x + pair[1].x), before, measured };
-        }
-    }
-    Some(best)
+        beyond -= pair[0].asked - lost(&pair[0]);
+        (0.5 * (pair[0].x + pair[1].x), before, beyond)
+    });
+    std::iter::once(first).chain(cuts).min_by(|a, b| (a.1 + a.2).total_cmp(&(b.1 + b.2)))
 }
 
 /// Standard deviation of the depth by the model, m, where the views come nearest to `z`.

@@ -17,7 +17,7 @@ pub struct Point {
     pub at_least: bool,
 }
 
-/// Bins over an axis's reach; a tilted view spans several.
+/// Bins over an axis's reach: a tilted view spans several, and a band of a few per cent still shows.
 pub const BINS: usize = 40;
 
 /// Share lost from which the target search passes over the holes, so that shares are lower bounds.

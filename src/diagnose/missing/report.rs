@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::cells::Cell;
 use super::fit::{Fitted, fit};
-use super::points::{Point, bounded, misfit, part, points};
+use super::points::{BINS, Point, bounded, misfit, part, points};
 use super::search::{Judged, Losses};
 use super::shapes::{Shape, Step};
 use crate::camera::Camera;
@@ -191,9 +191,6 @@ fn interval(fitted: &Fitted, [low, high]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// Bins of a curve; a band of a few per cent of the axis still shows.
-const BINS: usize = 40;
-
 /// Lost shares per bin; the views are the sample.
 fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f64) -> Curve {
     let mut curve = Curve {
@@ -269,14 +266,13 @@ fn described(
 ) -> Finding {
     let status = if family.is_some() { Status::Named } else { Status::Unexplained };
     let ([from, to], unit) = (found.interval.map(digits), found.unit);
-    let (since_s, by_incidence) =
-        (shape.and_then(Shape::since_s), shape.is_some_and(Shape::by_incidence));
+    let step = shape.and_then(|s| if let Shape::Step(step) = s { Some(step) } else { None });
     let shape = family.is_none().then(|| format!("more is lost from {from} to {to} {unit}"));
     let mut words = physics(status, family, Statistic::Dropout, found.axis, shape.as_deref());
-    if by_incidence && family.is_some() {
+    if step.is_some_and(|s| s.incidence) && family.is_some() {
         words += " It goes with the angle at which each pixel sees the target; the numbers are those of the plane's tilt that come nearest.";
     }
-    if let Some(since) = since_s {
+    if let Some(since) = step.and_then(|s| s.since_s) {
         words += &format!(" It began about {since:.1} s after the first view.");
     }
     let alternatives = family.map_or_else(Vec::new, |name| weighed(name, found.share, rivals));

@@ -111,19 +111,6 @@ impl Shape {
             Shape::Curve(_) => None,
         }
     }
-
-    /// Whether it follows the angle of incidence at each pixel.
-    pub fn by_incidence(&self) -> bool {
-        matches!(self, Shape::Step(Step { incidence: true, .. }))
-    }
-
-    /// Start, s after the first view, if it begins mid-session.
-    pub fn since_s(&self) -> Option<f64> {
-        match self {
-            Shape::Step(step) => step.since_s,
-            Shape::Curve(_) => None,
-        }
-    }
 }
 
 /// Middles tried for a step, over the axis's reach.
@@ -135,16 +122,7 @@ const WIDTHS: [f64; 3] = [0.015, 0.03, 0.06];
 const MIN_TILT: f64 = 0.1;
 const MIN_RANGE: f64 = 1.1;
 
-/// All steps in range or tilt.
-fn steps(reach: &Extent, camera: &Camera) -> Vec<Step> {
-    grid(reach, camera, &WIDTHS_DEG, &WIDTHS, &[1.0, 0.3])
-}
-
-/// Whole steps (share 1) of the middle width.
-fn usual_steps(reach: &Extent, camera: &Camera) -> Vec<Step> {
-    grid(reach, camera, &WIDTHS_DEG[1..2], &WIDTHS[1..2], &[1.0])
-}
-
+/// Steps in range or tilt of these widths and shares.
 fn grid(
     reach: &Extent,
     camera: &Camera,
@@ -157,18 +135,13 @@ fn grid(
     let along = |k: usize| k as f64 / (MIDDLES - 1) as f64;
     if is_told_apart(Axis::Theta, reach) {
         let [low, high] = reach.theta;
-        for k in 0..MIDDLES {
-            let beyond = 4f64.to_radians();
-            let middle = low + along(k) * (high + beyond - low);
-            let step = |deg: &f64| Step::whole(Axis::Theta, middle, deg.to_radians());
-            widths_deg.iter().for_each(|deg| add(step(deg)));
-        }
         // The corner of the picture sees a plane turned away from it more steeply by its own ray's angle.
-        let steepest = (high + corner_radius(camera).atan()).min(FRAC_PI_2);
-        for k in 0..MIDDLES {
-            let middle = low + along(k) * (steepest - low);
-            let step = |deg: &f64| Step::whole(Axis::Theta, middle, deg.to_radians());
-            widths_deg.iter().for_each(|deg| add(Step { incidence: true, ..step(deg) }));
+        let corner = (high + corner_radius(camera).atan()).min(FRAC_PI_2);
+        for (incidence, steepest) in [(false, high + 4f64.to_radians()), (true, corner)] {
+            for middle in (0..MIDDLES).map(|k| low + along(k) * (steepest - low)) {
+                let step = |deg: &f64| Step::whole(Axis::Theta, middle, deg.to_radians());
+                widths_deg.iter().for_each(|deg| add(Step { incidence, ..step(deg) }));
+            }
         }
     }
     if is_told_apart(Axis::Z, reach) {
@@ -242,8 +215,10 @@ pub struct Shapes {
 impl Shapes {
     /// Shapes for views at these `times`, s of the session.
     pub fn of(reach: &Extent, camera: &Camera, times: impl Iterator<Item = f64>) -> Self {
-        let begun = begun(&usual_steps(reach, camera), times);
-        Shapes { steps: steps(reach, camera), begun, curves: curves(camera, reach) }
+        let steps = grid(reach, camera, &WIDTHS_DEG, &WIDTHS, &[1.0, 0.3]);
+        // Whole steps (share 1) of the middle width.
+        let usual = grid(reach, camera, &WIDTHS_DEG[1..2], &WIDTHS[1..2], &[1.0]);
+        Shapes { steps, begun: begun(&usual, times), curves: curves(camera, reach) }
     }
 
     /// Returns the shapes on other axes than these.

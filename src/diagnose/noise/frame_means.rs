@@ -35,7 +35,7 @@ impl Motion {
     fn of(all: &[Jitter], noise: &FrameNoise) -> Option<Self> {
         let known: Vec<(f64, f64)> = all
             .iter()
-            .filter(|j| j.trend_px2 > 0.0 && j.freedom > 0.0)
+            .filter(|j| j.trend_px2 > 0.0 && j.about.freedom > 0.0)
             .map(|j| (j.velocity_mps, j.velocity_mps.powi(2) / j.trend_px2 * noise.own_px2(j)))
             .filter(|(_, variance)| *variance > 0.0)
             .collect();
@@ -72,15 +72,17 @@ struct FrameNoise {
 
 impl FrameNoise {
     fn of(all: &[Jitter]) -> Self {
-        let freedom: f64 = all.iter().map(|j| j.freedom).sum();
-        let beside: f64 = all.iter().map(|j| j.scatter_px2 - j.freedom * j.expected_px2).sum();
+        let freedom: f64 = all.iter().map(|j| j.about.freedom).sum();
+        let beside: f64 =
+            all.iter().map(|j| j.about.sum - j.about.freedom * j.about.expected).sum();
         let mut noise = FrameNoise { freedom, extra_px2: beside / freedom, cv2: 0.0 };
         // For a ratio r with f degrees of freedom, (r - 1)^2 averages cv2 (1 + 2 / f) + 2 / f.
         let off = |j: &Jitter| {
-            let by_chance = 2.0 / j.freedom;
+            let by_chance = 2.0 / j.about.freedom;
             ((noise.ratio(j) - 1.0).powi(2) - by_chance) / (1.0 + by_chance)
         };
-        let measured = all.iter().filter(|j| j.freedom > 0.0 && noise.px2(j) > f64::MIN_POSITIVE);
+        let measured =
+            all.iter().filter(|j| j.about.freedom > 0.0 && noise.px2(j) > f64::MIN_POSITIVE);
         let (sum, n) = measured.fold((0.0, 0.0), |(sum, n), j| (sum + off(j), n + 1.0));
         noise.cv2 = (sum / f64::max(n, 1.0)).max(0.0);
         noise
@@ -88,11 +90,11 @@ impl FrameNoise {
 
     /// Scatter of a view's own frames over the expected.
     fn ratio(&self, view: &Jitter) -> f64 {
-        view.scatter_px2 / (view.freedom * self.px2(view))
+        view.about.sum / (view.about.freedom * self.px2(view))
     }
 
     fn px2(&self, view: &Jitter) -> f64 {
-        (view.expected_px2 + self.extra_px2.max(0.0)).max(f64::MIN_POSITIVE)
+        (view.about.expected + self.extra_px2.max(0.0)).max(f64::MIN_POSITIVE)
     }
 
     /// Variance of a view, moderated (Smyth 2004, the prior by its moments): its own frames count as far as
@@ -101,7 +103,7 @@ impl FrameNoise {
         // Inverse gamma variances of d degrees of freedom have cv2 = 2 / (d - 4), and
         // their mean has weight d - 2.
         let others = 2.0 * (1.0 + self.cv2);
-        let own = self.cv2 * view.freedom;
+        let own = self.cv2 * view.about.freedom;
         self.px2(view) * ((others + own * self.ratio(view)) / (others + own)).max(1.0)
     }
 }
@@ -144,7 +146,7 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
     let by_noise =
         |of: &dyn Fn(&Jitter) -> f64| all.iter().map(|j| of(j) / noise.px2(j)).sum::<f64>();
     let line = by_noise(&|j| j.trend_px2) / n;
-    let about_it = (by_noise(&|j| j.scatter_px2) / noise.freedom).max(1.0);
+    let about_it = (by_noise(&|j| j.about.sum) / noise.freedom).max(1.0);
     // Frames correlated with their neighbours drift.
     let wander = (1.0 + rho) / (1.0 - rho).max(0.05);
     let f = line / (about_it * wander * wander);
@@ -179,11 +181,7 @@ fn jitter(
     variance_px2: f64,
     [much, level]: [f64; 2],
 ) -> Option<TextureFinding> {
-    let beside = all.iter().map(|j| Squares {
-        sum: j.scatter_px2,
-        freedom: j.freedom,
-        expected: j.expected_px2 + known_px2,
-    });
+    let beside = all.iter().map(|j| Squares { expected: j.about.expected + known_px2, ..j.about });
     let Excess { p, nats, .. } = Excess::of(beside, much, level)?;
     // The total, as in a model.
     let sigma = noise.extra_px2.sqrt();
@@ -232,9 +230,7 @@ mod tests {
                 let mm: f64 = m.iter().map(|m| (m - mean).powi(2)).sum();
                 Structure {
                     jitter: Some(Jitter {
-                        scatter_px2: mm - tm * tm / tt,
-                        freedom: 2.0,
-                        expected_px2: 1e-7,
+                        about: Squares { sum: mm - tm * tm / tt, freedom: 2.0, expected: 1e-7 },
                         trend_px2: tm * tm / tt,
                         velocity_mps: -tm / tt * M_PER_PX,
                     }),
@@ -255,9 +251,9 @@ mod tests {
     fn a_view_counts_by_its_own_frames_as_far_as_views_differ() {
         let mut rng = Seed(11).stream("frame-means/moderated");
         let mut view = |true_px2: f64, freedom: u32| {
-            let scatter_px2 = (0..freedom).map(|_| true_px2 * normal(&mut rng).powi(2)).sum();
-            let freedom = f64::from(freedom);
-            Jitter { scatter_px2, freedom, expected_px2: 1.0, trend_px2: 1.0, velocity_mps: 1.0 }
+            let sum = (0..freedom).map(|_| true_px2 * normal(&mut rng).powi(2)).sum();
+            let about = Squares { sum, freedom: f64::from(freedom), expected: 1.0 };
+            Jitter { about, trend_px2: 1.0, velocity_mps: 1.0 }
         };
         let mut over = 0.0;
         for _ in 0..200 {
@@ -277,16 +273,12 @@ mod tests {
     fn views_count_by_their_own_noise() {
         let mut rng = Seed(9).stream("motion/uneven");
         let view = |n: u32| {
-            let expected_px2 = 1e-6 * f64::from(1 << n);
-            let spread = expected_px2.sqrt();
+            let expected = 1e-6 * f64::from(1 << n);
+            let spread = expected.sqrt();
             let trend = 0.006 + spread * normal(&mut rng);
-            let jitter = Jitter {
-                scatter_px2: (spread * normal(&mut rng)).powi(2),
-                freedom: 1.0,
-                expected_px2,
-                trend_px2: trend * trend,
-                velocity_mps: trend,
-            };
+            let sum = (spread * normal(&mut rng)).powi(2);
+            let about = Squares { sum, freedom: 1.0, expected };
+            let jitter = Jitter { about, trend_px2: trend * trend, velocity_mps: trend };
             Structure { jitter: Some(jitter), ..Structure::default() }
         };
         let velocity = velocity(&(0..12).map(view).collect::<Vec<_>>()).expect("a motion");

@@ -23,6 +23,33 @@ impl Squares {
     pub fn beyond(&self) -> f64 {
         self.sum / self.freedom - self.expected
     }
+
+    /// Scatter of the slopes of a view's frames about a line in time, over both axes of the picture: px^2 at
+    /// one standard deviation of the target's pixels from its centre.
+    ///
+    /// Uses the frames kept; `mean_px2` is the variance of a frame's mean. `None` with fewer than three, not
+    /// counting those that lost many pixels. The error of the slopes is larger where the noise grows away
+    /// from the centre, as on a tilted target.
+    pub fn of_slopes(field: &Field, mean_px2: f64) -> Option<Self> {
+        let axes = axes(field)?;
+        let slopes = field.first.iter().map(|r| slopes(field, r, &axes));
+        let whole = |n: f64| n >= MIN_SHARE * field.measured_pixels();
+        let frames: Vec<(f64, [f64; 2])> = (field.frames.iter().zip(slopes))
+            .filter(|(_, (n, _))| *n > 0.0 && whole(*n))
+            .map(|((t, _), (_, slopes))| (*t, slopes))
+            .collect();
+        let of_axis = |axis: usize| {
+            let series: Vec<(f64, f64)> = frames.iter().map(|(t, s)| (*t, s[axis])).collect();
+            AboutLine::of(&series).map(|line| line.scatter)
+        };
+        let sum = of_axis(0)? + of_axis(1)?;
+        let freedom = 2.0 * (frames.len() as f64 - 2.0);
+        let noise = || field.sigma.iter().map(|s| f64::from(*s).powi(2));
+        let apart = axes.iter().zip(noise()).map(|([u, v], px2)| 0.5 * (u * u + v * v) * px2);
+        let lever = apart.sum::<f64>() / noise().sum::<f64>();
+        let expected = lever * mean_px2;
+        (expected > 0.0).then_some(Squares { sum, freedom, expected })
+    }
 }
 
 /// Scatter of values beyond their noise.
@@ -84,11 +111,8 @@ impl AboutLine {
 /// Mean residual of the target, frame by frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Jitter {
-    /// Sum of squares about the line, px^2, and its degrees of freedom.
-    pub scatter_px2: f64,
-    pub freedom: f64,
-    /// Scatter / freedom expected from the pixels' own noise, px^2.
-    pub expected_px2: f64,
+    /// Squares about the line, px^2.
+    pub about: Squares,
     /// Sum of squares explained by the line, px^2.
     pub trend_px2: f64,
     /// Velocity along the optical axis, m/s.
@@ -107,41 +131,14 @@ impl Jitter {
         }
         let z = field.scale_px_m / disparity;
         Some(Jitter {
-            scatter_px2: line.scatter,
-            freedom: frames.len() as f64 - 2.0,
-            expected_px2,
+            about: Squares {
+                sum: line.scatter,
+                freedom: frames.len() as f64 - 2.0,
+                expected: expected_px2,
+            },
             trend_px2: line.trend,
             velocity_mps: -line.slope / disparity * z,
         })
-    }
-}
-
-impl Squares {
-    /// Scatter of the slopes of a view's frames about a line in time, over both axes of the picture: px^2 at
-    /// one standard deviation of the target's pixels from its centre.
-    ///
-    /// Uses the frames kept; `mean_px2` is the variance of a frame's mean. `None` with fewer than three, not
-    /// counting those that lost many pixels. The error of the slopes is larger where the noise grows away
-    /// from the centre, as on a tilted target.
-    pub fn of_slopes(field: &Field, mean_px2: f64) -> Option<Self> {
-        let axes = axes(field)?;
-        let slopes = field.first.iter().map(|r| slopes(field, r, &axes));
-        let whole = |n: f64| n >= MIN_SHARE * field.measured_pixels();
-        let frames: Vec<(f64, [f64; 2])> = (field.frames.iter().zip(slopes))
-            .filter(|(_, (n, _))| *n > 0.0 && whole(*n))
-            .map(|((t, _), (_, slopes))| (*t, slopes))
-            .collect();
-        let of_axis = |axis: usize| {
-            let series: Vec<(f64, f64)> = frames.iter().map(|(t, s)| (*t, s[axis])).collect();
-            AboutLine::of(&series).map(|line| line.scatter)
-        };
-        let sum = of_axis(0)? + of_axis(1)?;
-        let freedom = 2.0 * (frames.len() as f64 - 2.0);
-        let noise = || field.sigma.iter().map(|s| f64::from(*s).powi(2));
-        let apart = axes.iter().zip(noise()).map(|([u, v], px2)| 0.5 * (u * u + v * v) * px2);
-        let lever = apart.sum::<f64>() / noise().sum::<f64>();
-        let expected = lever * mean_px2;
-        (expected > 0.0).then_some(Squares { sum, freedom, expected })
     }
 }
 

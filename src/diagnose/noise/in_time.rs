@@ -2,7 +2,7 @@
 
 use super::moderated::{Moderated, any_two, falling, last, next};
 use super::structure::Structure;
-use super::texture_finding::{Shared, TextureFinding};
+use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats, variance_px2};
 use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::known::KnownTerms;
@@ -39,15 +39,10 @@ pub fn in_time(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<Textu
     let fixed = fixed(views);
     let variance = variance_px2(views);
     let known_px = known.parameter(FIXED_PATTERN, "sigma_px").unwrap_or(0.0);
-    let pattern = Shared {
-        families: vec![FIXED_PATTERN],
-        statistic: Statistic::Bias,
-        axis: Axis::Pixel,
-        expected_px2: known_px * known_px,
-        min_share: MIN_FIXED,
-        words: None,
-    };
-    let found = fixed.and_then(|m| pattern.found(&m, variance, level));
+    let known_px2 = known_px * known_px;
+    let worth = |m: &ViewMean| (m.value - known_px2) / variance.max(1e-12) > MIN_FIXED;
+    let pattern = TextureFinding::named(vec![FIXED_PATTERN], Statistic::Bias, Axis::Pixel);
+    let found = fixed.filter(worth).and_then(|m| pattern.shared(&m, known_px2, variance, level));
     let mut found: Vec<TextureFinding> = found.map(|f| of_pixels(f, views)).into_iter().collect();
     // The pattern's error is common to the correlations of all views.
     let of_pattern = fixed.map_or(0.0, |m| m.std_error * mean_precision(views));

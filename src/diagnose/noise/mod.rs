@@ -38,7 +38,7 @@ use pairs::REACH_PX;
 use some_views::some_views;
 use still::Still;
 use structure::Structure;
-use texture_finding::{Shared, TextureFinding};
+use texture_finding::TextureFinding;
 use view_mean::{ViewMean, nats, variance_px2};
 use window::{Window, part};
 
@@ -207,6 +207,25 @@ pub const ROW_NOISE: &str = "row-noise";
 
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let variance = variance_px2(views);
+    let plain = |families, statistic, axis, words: Option<&str>| TextureFinding {
+        words: words.map(String::from),
+        ..TextureFinding::named(families, statistic, axis)
+    };
+    let still = [
+        (Axis::Column, "each column has a constant error of its own, unlike its neighbours'"),
+        (Axis::Row, "each row has a constant error of its own, unlike its neighbours'"),
+        (Axis::Pixel, "a fine pattern over the picture is the same in all views"),
+    ];
+    let still = still.into_iter().enumerate().filter_map(|(k, (axis, words))| {
+        let of = |s: &Still| [s.lines_px2[0], s.lines_px2[1], s.blotches_px2][k];
+        let by_pattern = ViewMean::of(views, |s| Some(s.still.by_pattern_px2[k]));
+        let m = ViewMean::of_pairs(views, |s| of(&s.still))?;
+        let m = m.and_error(by_pattern.map_or(0.0, |m| m.value));
+        let plain = plain(vec![], Statistic::Bias, axis, Some(words));
+        // Columns, rows and blotches share one level.
+        let found = plain.shared(&m, known.error_of_lines_px2(axis), variance, level / 3.0)?;
+        Some(TextureFinding { p: 3.0 * found.p, ..found })
+    });
     // The noise of known rows adds to the error of what they share.
     let means = if known.has(ROW_NOISE) {
         Moderated::by_scatter(views)
@@ -214,56 +233,15 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         Moderated::of(views, known)
     };
     let known_px = known.parameter(ROW_NOISE, "sigma_px").unwrap_or(0.0);
-    let line = |families, statistic, axis, expected_px2, words| Shared {
-        families,
-        statistic,
-        axis,
-        expected_px2,
-        min_share: 0.0,
-        words,
-    };
     let afresh = "each column is shifted as one, afresh in every frame";
-    let row = known_px * known_px;
-    let still = |of: fn(&Still) -> (Option<f64>, f64), axis, words| {
-        let known_px2 = known.error_of_lines_px2(axis);
-        let line = line(vec![], Statistic::Bias, axis, known_px2, Some(words));
-        let by_pattern = ViewMean::of(views, |s| Some(of(&s.still).1)).map_or(0.0, |m| m.value);
-        // Columns, rows and blotches share one level.
-        let shared = ViewMean::of_pairs(views, |s| of(&s.still).0);
-        (shared.map(|m| m.and_error(by_pattern)), line, 3.0)
-    };
-    let all = [
-        still(
-            |s| (s.lines_px2[0], s.by_pattern_px2[0]),
-            Axis::Column,
-            "each column has a constant error of its own, unlike its neighbours'",
-        ),
-        still(
-            |s| (s.lines_px2[1], s.by_pattern_px2[1]),
-            Axis::Row,
-            "each row has a constant error of its own, unlike its neighbours'",
-        ),
-        still(
-            |s| (s.blotches_px2, s.by_pattern_px2[2]),
-            Axis::Pixel,
-            "a fine pattern over the picture is the same in all views",
-        ),
-        (
-            means.mean_of_lines(0),
-            line(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, row, None),
-            1.0,
-        ),
-        (
-            means.mean_of_lines(1),
-            line(vec![], Statistic::Correlation, Axis::Column, 0.0, Some(afresh)),
-            1.0,
-        ),
+    let afresh = [
+        (plain(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, None), known_px * known_px),
+        (plain(vec![], Statistic::Correlation, Axis::Column, Some(afresh)), 0.0),
     ];
-    let found = |(m, line, tests): (Option<ViewMean>, Shared, f64)| {
-        let found = line.found(&m?, variance, level / tests)?;
-        Some(TextureFinding { p: tests * found.p, ..found })
-    };
-    all.into_iter().filter_map(found).collect()
+    let afresh = afresh.into_iter().enumerate().filter_map(|(axis, (plain, known_px2))| {
+        plain.shared(&means.mean_of_lines(axis)?, known_px2, variance, level)
+    });
+    still.chain(afresh).collect()
 }
 
 #[cfg(test)]

@@ -137,7 +137,9 @@ impl Case<'_> {
     fn take_out_lines(&self, mean: &mut MeanResult, axes: &[Axis]) {
         let views = beside_bias(&self.fields, &mean.px);
         mean.lines = axes.iter().filter_map(|axis| LearntLines::of(&views, *axis)).collect();
-        mean.px = pixel_terms(&self.fields, &mean.all_terms(), &self.survey, &self.bench);
+        let profiles = mean.lines.iter().map(|l| &l.profile);
+        let all: Vec<Term> = mean.terms.iter().chain(profiles).cloned().collect();
+        mean.px = pixel_terms(&self.fields, &all, &self.survey, &self.bench);
     }
 
     /// Structure of the noise; against a simulation, what exceeds the simulation's.
@@ -147,7 +149,7 @@ impl Case<'_> {
             let more = baseline.too_much(structure, each);
             baseline.remarks.extend(more);
             let found = self.extended.then(|| self.known.clone());
-            let parts = baseline.noise_parts(structure, each);
+            let parts = NoiseParts::of(structure, &baseline.structure, each);
             shrunk = parts.as_ref().is_some_and(NoiseParts::shrink_alike);
             of_parts = baseline.noise_findings(parts.as_ref(), structure, &self.fields, each);
             baseline.compare(structure, &self.lattice, &mut self.known);

@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Map, json};
 
 use super::*;
-use crate::diagnose::noise::frame_series::Jitter;
+use crate::diagnose::noise::frame_series::{Jitter, Squares};
 use crate::diagnose::noise::in_time::still_share;
 use crate::diagnose::noise::moments::Moments;
 use crate::diagnose::noise::still::Still;
@@ -228,17 +228,12 @@ fn columns_that_move_as_one_have_no_name() {
 /// Means of 6 frames about a line; `sigma_px` is their scatter beyond what the pixels explain.
 fn jitter(sigma_px: f64, velocity_px: f64, rng: &mut Stream) -> Jitter {
     const FREEDOM: usize = 4;
-    let expected_px2 = 1e-6;
-    let spread = (expected_px2 + sigma_px * sigma_px).sqrt();
-    let scatter_px2 = (0..FREEDOM).map(|_| (spread * normal(rng)).powi(2)).sum();
+    let expected = 1e-6;
+    let spread = (expected + sigma_px * sigma_px).sqrt();
+    let sum = (0..FREEDOM).map(|_| (spread * normal(rng)).powi(2)).sum();
     let trend = spread * normal(rng) + velocity_px * rng.random_range(0.8..1.2);
-    Jitter {
-        scatter_px2,
-        freedom: FREEDOM as f64,
-        expected_px2,
-        trend_px2: trend * trend,
-        velocity_mps: trend,
-    }
+    let about = Squares { sum, freedom: FREEDOM as f64, expected };
+    Jitter { about, trend_px2: trend * trend, velocity_mps: trend }
 }
 
 fn moving(sigma_px: f64, velocity_px: f64, rng: &mut Stream) -> Vec<Structure> {

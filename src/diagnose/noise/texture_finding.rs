@@ -65,36 +65,28 @@ impl TextureFinding {
             of_some: None,
         }
     }
+
+    /// Fills in variance that pixels or lines share: the mean `m` of the views, where it is above the
+    /// `expected_px2` of the model; `variance_px2` is that of the noise.
+    pub fn shared(
+        self,
+        m: &ViewMean,
+        expected_px2: f64,
+        variance_px2: f64,
+        level: f64,
+    ) -> Option<Self> {
+        let p = m.p_above(expected_px2);
+        let share = (m.value - expected_px2) / variance_px2.max(1e-12);
+        let sigma = m.value.max(0.0).sqrt();
+        (p < level && share > 0.0).then(|| TextureFinding {
+            parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
+            size_sigma: share.sqrt(),
+            p,
+            nats: nats(m, expected_px2),
+            ..self
+        })
+    }
 }
 
 /// Parameter that marks weak tails; far errors do not have it.
 pub const EXCESS: &str = "excess_kurtosis";
-
-/// A test for variance that pixels or lines share.
-pub struct Shared {
-    pub families: Vec<&'static str>,
-    pub statistic: Statistic,
-    pub axis: Axis,
-    /// Variance in the model, px^2.
-    pub expected_px2: f64,
-    /// Least share of the total variance worth reporting.
-    pub min_share: f64,
-    pub words: Option<&'static str>,
-}
-
-impl Shared {
-    /// Tests `m` against the model; `variance_px2` is that of the noise, both px^2.
-    pub fn found(self, m: &ViewMean, variance_px2: f64, level: f64) -> Option<TextureFinding> {
-        let p = m.p_above(self.expected_px2);
-        let share = (m.value - self.expected_px2) / variance_px2.max(1e-12);
-        let sigma = m.value.max(0.0).sqrt();
-        (p < level && share > self.min_share).then(|| TextureFinding {
-            parameters: one("sigma_px", sigma, 0.5 * m.std_error / sigma.max(1e-9)),
-            size_sigma: share.sqrt(),
-            p,
-            nats: nats(m, self.expected_px2),
-            words: self.words.map(String::from),
-            ..TextureFinding::named(self.families, self.statistic, self.axis)
-        })
-    }
-}

@@ -35,12 +35,7 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
         curve(Coordinate::Right, reach.right, 12, Modulation::Lift),
         curve(Coordinate::Down, reach.down, 12, Modulation::Lift),
         curve(Coordinate::Edge, [0.0, 24.0], 9, Modulation::One),
-        Candidate::curve(Basis::Ring {
-            over: Coordinate::Disparity,
-            period: 1.0,
-            nodes: 12,
-            times: Modulation::One,
-        }),
+        Candidate::ring(Coordinate::Disparity, 1.0, 12),
         map(8, 6, Modulation::One),
         map(8, 6, Modulation::DisparitySquared),
     ];
@@ -71,13 +66,5 @@ fn along(camera: &Camera) -> Candidate {
 /// Periodic curves in depth, as from the harmonics of a time-of-flight camera.
 fn waves(reach: &Extent) -> impl Iterator<Item = Candidate> {
     let span = reach.z[1] - reach.z[0];
-    (3..=16).map(move |cycles| {
-        let period = span / f64::from(cycles);
-        Candidate::curve(Basis::Ring {
-            over: Coordinate::Z,
-            period,
-            nodes: 6,
-            times: Modulation::One,
-        })
-    })
+    (3..=16).map(move |cycles| Candidate::ring(Coordinate::Z, span / f64::from(cycles), 6))
 }

@@ -25,6 +25,11 @@ impl Candidate {
         Candidate { family: None, basis, flat: None }
     }
 
+    /// A periodic curve without a name.
+    pub fn ring(over: Coordinate, period: f64, nodes: usize) -> Self {
+        Candidate::curve(Basis::Ring { over, period, nodes, times: Modulation::One })
+    }
+
     /// A step at `at` from one level to another, rising over a width of `wide`.
     pub fn step(over: Coordinate, at: f64, wide: f64) -> Self {
         let (low, high) = (at - 0.5 * wide, at + 0.5 * wide);

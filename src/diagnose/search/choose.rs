@@ -1,10 +1,10 @@
 //! Selects the candidate of a step: a name that explains as much as any, or the best curve.
 
 use super::candidate::{Candidate, RECALIBRATE};
-use super::judge::Judged;
 use super::layer_null::{Group, LayerNull};
 use super::outcome::{Chosen, Rival};
 use super::rules::Rules;
+use super::trial::Judged;
 use crate::diagnose::finding::naming::{ln_occam, ln_odds};
 use crate::terms::Basis;
 

@@ -74,12 +74,7 @@ fn what_many_causes_explain_has_no_name() {
     let level = |id| Candidate::named(id, Basis::Level);
     let causes =
         ["slope-noise", "range-exponent", "tilt-axis-anisotropy", "ambient-light"].map(level);
-    let curve = Candidate::curve(Basis::Ring {
-        over: Coordinate::Column,
-        period: 1.0,
-        nodes: 8,
-        times: Modulation::One,
-    });
+    let curve = Candidate::ring(Coordinate::Column, 1.0, 8);
     let found =
         |candidate, gain| (candidate, Best { gain, views: vec![3], beta: DVector::zeros(1) });
     let with = |causes| -> Vec<(&Candidate, Best)> {

@@ -13,6 +13,7 @@ use super::search;
 use super::variance;
 use crate::camera::Camera;
 use crate::diagnose::joint::{error::clustered, refit};
+use crate::diagnose::options::Ablation;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::samples::{ViewData, coarser, smooth_px};
 use crate::diagnose::views::tiles::SIDE;
@@ -58,7 +59,7 @@ impl Survey {
 
     /// Rules of the search of the mean.
     pub fn bias_rules(&self, camera: &Camera, level: f64) -> Rules {
-        self.ablation.rules(Rules {
+        Rules {
             level,
             prior: BIAS_PRIOR,
             adequacy: NAME_ADEQUATE,
@@ -66,9 +67,9 @@ impl Survey {
             agreed: false,
             max_terms: MAX_TERMS,
             fixed: (self.fixed_px2 > 0.0).then(|| (self.fixed_px2.sqrt(), self.covered_px(camera))),
-            calibrated: true,
+            calibrated: self.ablation != Ablation::UncalibratedThresholds,
             learnt_from: self.learnt_from[0],
-        })
+        }
     }
 
     /// Terms of the mean, best first, fitted together without smooth maps or priors on their usual
@@ -96,7 +97,7 @@ impl Survey {
 
     /// Rules of the search of the variance.
     pub fn variance_rules(&self, level: f64) -> Rules {
-        self.ablation.rules(Rules {
+        Rules {
             level,
             prior: VARIANCE_PRIOR,
             adequacy: NAME_ADEQUATE,
@@ -104,9 +105,9 @@ impl Survey {
             agreed: true,
             max_terms: MAX_TERMS,
             fixed: None,
-            calibrated: true,
+            calibrated: self.ablation != Ablation::UncalibratedThresholds,
             learnt_from: self.learnt_from[1],
-        })
+        }
     }
 
     /// Refit of sigma, fitted together with every hypothesis of the variance; `None` unless sigma was

@@ -8,7 +8,6 @@ pub mod choose;
 mod each_view;
 pub mod evidence;
 pub mod few_views;
-pub mod judge;
 pub mod layer_null;
 pub mod layer_search;
 pub mod noise_gains;
@@ -37,12 +36,11 @@ use beside::Beside;
 use candidate::Candidate;
 use choose::Choice;
 use evidence::{Evidence, fit, gain};
-use judge::{Judged, looks};
 use layer_null::{Group, LayerNull};
 use outcome::{Chosen, Look, Outcome, bases, bases_where};
 use prepared::{Grouping, Patches, Prepared, Together, prepare};
 use rules::Rules;
-use trial::{Trial, nests};
+use trial::{Judged, Trial, looks, nests};
 
 /// Smallest gain of a later term, as a share of the first term's; anything smaller is a misfit of the
 /// first term's shape.

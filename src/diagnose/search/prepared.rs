@@ -1,6 +1,7 @@
 //! A view prepared for candidates: the columns fitted alongside them, with samples that a candidate
 //! cannot tell apart merged.
 
+use std::borrow::Borrow;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -76,13 +77,16 @@ pub fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
         (place.v / side) as usize * ACROSS + (place.u / side) as usize
     };
     let fill = |i: usize, row: &mut [f64]| fill_all(terms, &view.places[i], row);
-    Some(rows.reduce_by_blocks(count, block, |_| (0..count).collect(), fill))
+    let mut sum = Evidence::zeros(count);
+    rows.add_by_blocks(&mut sum, block, |_| (0..count).collect(), fill);
+    sum.a.fill_upper_triangle_with_lower_triangle();
+    Some(sum)
 }
 
 /// Fills the columns of several terms, one after the other.
-pub(super) fn fill_all(terms: &[&Basis], place: &PixelContext, row: &mut [f64]) {
+pub fn fill_all(terms: &[impl Borrow<Basis>], place: &PixelContext, row: &mut [f64]) {
     let mut rest = row;
-    for basis in terms {
+    for basis in terms.iter().map(Borrow::<Basis>::borrow) {
         let (mine, others) = rest.split_at_mut(basis.count());
         basis.fill(place, mine);
         rest = others;

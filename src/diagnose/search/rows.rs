@@ -120,8 +120,8 @@ impl<'a> Rows<'a> {
                 into.iter_mut().zip(sample).for_each(|(sum, x)| *sum += wg * x);
             }
         }
-        let mut sum = self.nothing(count);
         let m = self.width - self.nuisances();
+        let mut sum = Evidence::zeros(m + count);
         sum.a
             .view_mut((m, m), (count, count))
             .copy_from(&DMatrix::from_row_slice(count, count, &a));
@@ -130,28 +130,9 @@ impl<'a> Rows<'a> {
         sum
     }
 
-    /// Zero evidence on the chosen terms and `count` columns.
-    fn nothing(&self, count: usize) -> Evidence {
-        Evidence::zeros(self.width - self.nuisances() + count)
-    }
-
-    /// Like [`Rows::reduce`], for many columns of which neighbouring samples touch the same few.
-    /// `block` gives a sample's neighbourhood, `touched` the columns that may be nonzero in one, and
-    /// `columns` fills only these.
-    pub fn reduce_by_blocks(
-        &self,
-        count: usize,
-        block: impl Fn(usize) -> usize,
-        touched: impl Fn(usize) -> Vec<usize>,
-        columns: impl FnMut(usize, &mut [f64]),
-    ) -> Evidence {
-        let mut sum = self.nothing(count);
-        self.add_by_blocks(&mut sum, block, touched, columns);
-        sum.a.fill_upper_triangle_with_lower_triangle();
-        sum
-    }
-
-    /// Adds the same to `sum`, lower triangle only; the upper one is to be filled after the last view.
+    /// Adds what [`Rows::reduce`] gives to `sum`, for many columns of which neighbouring samples touch the
+    /// same few: `block` gives a sample's neighbourhood, `touched` the columns that may be nonzero in one, and
+    /// `columns` fills only these. Lower triangle only; the upper one is to be filled after the last view.
     pub fn add_by_blocks(
         &self,
         sum: &mut Evidence,

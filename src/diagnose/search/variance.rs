@@ -207,17 +207,14 @@ fn curves(camera: &Camera, reach: &Extent) -> Vec<Candidate> {
             nodes,
         })
     };
-    let ring = |over, period, nodes| {
-        Candidate::curve(Basis::Ring { over, period, nodes, times: Modulation::One })
-    };
     let mut all = vec![
         curve(Coordinate::LogZ, reach.z.map(f64::ln), 8),
         curve(Coordinate::Theta, reach.theta, 6),
-        ring(Coordinate::Azimuth, std::f64::consts::TAU, 8),
+        Candidate::ring(Coordinate::Azimuth, std::f64::consts::TAU, 8),
         curve(Coordinate::Radius, [0.0, 1.0], 8),
         curve(Coordinate::Column, [0.0, width], 12),
         curve(Coordinate::Row, [0.0, height], 12),
-        ring(Coordinate::Disparity, 1.0, 8),
+        Candidate::ring(Coordinate::Disparity, 1.0, 8),
         curve(Coordinate::Edge, [0.0, 24.0], 6),
         curve(Coordinate::Right, reach.right, 8),
         curve(Coordinate::Down, reach.down, 8),

@@ -49,7 +49,10 @@ impl Field {
             self.add(&image, time, &expected, &bench.table, clip_px);
         }
         self.edges = edges;
-        self.close();
+        for ((mean, square), n) in self.mean.iter_mut().zip(&mut self.square).zip(&self.count) {
+            *mean /= f32::from(*n);
+            *square /= f32::from(*n);
+        }
     }
 
     /// Finds the steps between a matcher's columns from the image alone, without a plane.
@@ -162,13 +165,5 @@ impl Field {
         };
         self.lines.push([(sum - slope * sx) / f64::max(n, 1.0), slope]);
         self.frames.push((time, if n > 0.0 { sum / n } else { f64::NAN }));
-    }
-
-    fn close(&mut self) {
-        for k in 0..self.pixels.len() {
-            let n = f32::from(self.count[k]);
-            self.mean[k] /= n;
-            self.square[k] /= n;
-        }
     }
 }

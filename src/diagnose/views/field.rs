@@ -16,7 +16,7 @@ use crate::model::SigmaModel;
 use crate::plane::Plane;
 use crate::stats::median_in_place;
 use crate::terms::edge_distances;
-use crate::view::{Sensor, View};
+use crate::view::View;
 
 /// One view's residuals.
 #[derive(Debug, Clone, Default)]
@@ -91,9 +91,20 @@ impl Field {
         session_start: f64,
     ) -> Result<Self> {
         let (target, mut frames) = TargetFrames::of(view, bench)?;
-        let mut field = Field::empty(view, bench.sensor, target.plane, target.pixels);
-        field.spread_px = (target.scale * field.scale_px_m) as f32;
+        let (sensor, notes) = (bench.sensor, &view.notes);
+        let (scale_px_m, size) = (sensor.scale_px_m(), [sensor.camera.width, sensor.camera.height]);
         let start = view.depth.first().map_or(0.0, |f| f.timestamp);
+        let mut field = Field {
+            name: view.name.clone(),
+            time_s: start,
+            spread_px: (target.scale * scale_px_m) as f32,
+            reference_distance_m: notes.reference_distance_m,
+            flatness_m: notes.target.and_then(|t| t.flatness_m),
+            temperature_c: notes.temperature_c,
+            ambient_lux: notes.ambient_lux,
+            region_given: notes.region.is_some(),
+            ..Field::unseen(target.plane, scale_px_m, size, target.pixels)
+        };
         let timed = frames.by_ref().map(|(k, frame)| (view.depth[k].timestamp - start, frame));
         field.accumulate(timed, bench, sigma, known, session_start);
         field.left_out = frames.left_out();
@@ -170,21 +181,6 @@ impl Field {
     /// Same, high-passed.
     pub fn high_passed(&self, values: &[f32]) -> Vec<f32> {
         high_pass(&self.image(values), self.width, SMOOTH_PX)
-    }
-
-    fn empty(view: &View, sensor: &Sensor, plane: Plane, pixels: Vec<u32>) -> Self {
-        let scale_px_m = sensor.scale_px_m();
-        let size = [sensor.camera.width, sensor.camera.height];
-        Field {
-            name: view.name.clone(),
-            time_s: view.depth.first().map_or(0.0, |f| f.timestamp),
-            reference_distance_m: view.notes.reference_distance_m,
-            flatness_m: view.notes.target.and_then(|t| t.flatness_m),
-            temperature_c: view.notes.temperature_c,
-            ambient_lux: view.notes.ambient_lux,
-            region_given: view.notes.region.is_some(),
-            ..Field::unseen(plane, scale_px_m, size, pixels)
-        }
     }
 
     /// Field of these pixels about a plane, without measurements or notes of the view.

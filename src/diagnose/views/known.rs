@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value};
-
 use crate::camera::Camera;
 use crate::effects::{self, RAY_FOR_DEPTH};
-use crate::model::{Covariance, NoiseModel, UNEXPLAINED};
+use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
 use crate::stats::mean;
 use crate::terms::{Axis, Basis, Statistic, Term, by_term};
 
@@ -17,24 +15,20 @@ pub struct KnownTerms {
     pub bias: Vec<Term>,
     /// Terms of the logarithm of its variance.
     pub variance: Vec<Term>,
-    entries: Vec<(String, Map<String, Value>)>,
-    /// Fitted shapes with the covariance of their coefficients.
-    learnt: Vec<(Vec<Term>, Covariance)>,
-    /// Scatter of terms from view to view: one standard deviation of each.
-    scatter: Vec<Term>,
+    effects: Vec<Effect>,
 }
 
 impl KnownTerms {
     pub fn of(model: &NoiseModel, camera: &Camera) -> Self {
-        let mut known = KnownTerms::default();
-        for entry in &model.effects {
+        let mut known = KnownTerms { effects: model.effects.clone(), ..KnownTerms::default() };
+        for effect in &model.effects {
             let simple;
-            let terms: &[Term] = if entry.shape.is_empty() {
-                let known = |name: &str| number(&entry.parameters, name);
-                simple = effects::find(&entry.id).and_then(|e| e.term(&known, camera));
+            let terms: &[Term] = if effect.shape.is_empty() {
+                let known = |name: &str| effect.number(name);
+                simple = effects::find(&effect.id).and_then(|e| e.term(&known, camera));
                 simple.as_slice()
             } else {
-                &entry.shape
+                &effect.shape
             };
             for term in terms {
                 match term.statistic {
@@ -43,33 +37,26 @@ impl KnownTerms {
                     _ => {}
                 }
             }
-            if !entry.shape.is_empty() {
-                let covariance = entry.covariance.clone().unwrap_or_default();
-                known.learnt.push((entry.shape.clone(), covariance));
-            }
-            let shares = entry.shape.iter().zip(&entry.between_views);
-            known.scatter.extend(shares.filter(|(_, s)| **s > 0.0).map(|(t, s)| t.times(*s)));
-            known.entries.push((entry.id.clone(), entry.parameters.clone()));
         }
         known
     }
 
     /// Marks a parameter of an effect as known, without subtracting anything.
     pub fn learn(&mut self, id: &str, name: &str, value: f64) {
-        let at = self.entries.iter().position(|(known, _)| known == id);
+        let at = self.effects.iter().position(|known| known.id == id);
         let at = at.unwrap_or_else(|| {
-            self.entries.push((id.into(), Map::new()));
-            self.entries.len() - 1
+            self.effects.push(Effect { id: id.into(), ..Effect::default() });
+            self.effects.len() - 1
         });
-        self.entries[at].1.insert(name.into(), value.into());
+        self.effects[at].parameters.insert(name.into(), value.into());
     }
 
     /// Marks all parameters of `found` as known, overriding what was learnt since.
     pub fn overrule(&mut self, found: &KnownTerms) {
-        for (id, parameters) in &found.entries {
-            for name in parameters.keys() {
-                if let Some(value) = number(parameters, name) {
-                    self.learn(id, name, value);
+        for effect in &found.effects {
+            for name in effect.parameters.keys() {
+                if let Some(value) = effect.number(name) {
+                    self.learn(&effect.id, name, value);
                 }
             }
         }
@@ -77,7 +64,7 @@ impl KnownTerms {
 
     /// Whether a part of the bias is a fitted shape.
     pub fn bias_is_learnt(&self) -> bool {
-        self.learnt.iter().flat_map(|(shape, _)| shape).any(|t| t.statistic == Statistic::Bias)
+        self.effects.iter().flat_map(|e| &e.shape).any(|t| t.statistic == Statistic::Bias)
     }
 
     /// Share of the ray's excess over the depth that raw values hold.
@@ -96,13 +83,20 @@ impl KnownTerms {
 
     /// Scatter of single views about the known terms: one standard deviation of each.
     pub fn between_views(&self, statistic: Statistic) -> Vec<Term> {
-        self.scatter.iter().filter(|t| t.statistic == statistic).cloned().collect()
+        let terms = self.effects.iter().flat_map(|e| e.shape.iter().zip(&e.between_views));
+        let mine = terms.filter(|(t, share)| t.statistic == statistic && **share > 0.0);
+        mine.map(|(t, share)| t.times(*share)).collect()
+    }
+
+    /// Fitted shapes with the covariance of their coefficients.
+    fn learnt(&self) -> impl Iterator<Item = (&[Term], &Covariance)> {
+        self.effects.iter().filter_map(|e| Some((&e.shape[..], e.covariance.as_ref()?)))
     }
 
     /// Uncertainty of the learnt terms: groups of terms that err together, by one standard deviation.
     pub fn errors(&self, statistic: Statistic) -> Vec<Vec<Term>> {
         let mut parts: BTreeMap<(u32, usize), Vec<Term>> = BTreeMap::new();
-        for (shape, covariance) in &self.learnt {
+        for (shape, covariance) in self.learnt() {
             for (k, factor) in covariance.factors.iter().enumerate() {
                 let part = parts.entry((covariance.fit, k)).or_default();
                 for (term, mine) in by_term(shape, factor) {
@@ -141,8 +135,8 @@ impl KnownTerms {
     /// Independent errors of the learnt terms' coefficients beyond [`KnownTerms::errors`]: one standard
     /// deviation of each. Profiles of single lines are excluded.
     pub fn own_errors(&self, statistic: Statistic) -> Vec<Term> {
-        let fitted = self.learnt.iter().filter(|(_, c)| !c.factors.is_empty());
-        let of = |(shape, covariance): &'_ (Vec<Term>, Covariance)| -> Vec<Term> {
+        let fitted = self.learnt().filter(|(_, c)| !c.factors.is_empty());
+        let of = |(shape, covariance): (&[Term], &Covariance)| -> Vec<Term> {
             let terms = by_term(shape, &covariance.variances);
             let rooted = terms.map(|(t, mine)| Term {
                 coefficients: mine.iter().map(|v| v.sqrt()).collect(),
@@ -156,51 +150,47 @@ impl KnownTerms {
 
     /// Error variance of the learnt profiles of single columns, or of single rows, px^2.
     pub fn error_of_lines_px2(&self, axis: Axis) -> f64 {
-        let of = |(shape, covariance): &(Vec<Term>, Covariance)| -> f64 {
+        let of = |(shape, covariance): (&[Term], &Covariance)| -> f64 {
             by_term(shape, &covariance.variances)
                 .filter(|(term, _)| term.basis.axis() == axis)
                 // Coefficients that were never learnt have no error.
                 .filter_map(|(_, mine)| mean(mine.iter().copied().filter(|v| *v > 0.0)))
                 .sum()
         };
-        self.learnt.iter().filter(|(_, c)| c.factors.is_empty()).map(of).sum()
+        self.learnt().filter(|(_, c)| c.factors.is_empty()).map(of).sum()
     }
 
     pub fn has(&self, id: &str) -> bool {
         self.entry(id).is_some()
     }
 
-    fn entry(&self, id: &str) -> Option<&Map<String, Value>> {
-        self.entries.iter().find(|(known, _)| known == id).map(|(_, parameters)| parameters)
+    fn entry(&self, id: &str) -> Option<&Effect> {
+        self.effects.iter().find(|known| known.id == id)
     }
 
-    /// Parameters of an entry as text.
+    /// Parameters of an effect as text.
     pub fn in_words(&self, id: &str) -> String {
         let entry = self.entry(id).into_iter();
-        let numbers = entry.flat_map(|p| p.keys().filter_map(|n| Some((n, number(p, n)?))));
+        let numbers =
+            entry.flat_map(|e| e.parameters.keys().filter_map(|n| Some((n, e.number(n)?))));
         numbers.map(|(name, value)| format!("{name} {value:.4}")).collect::<Vec<_>>().join(", ")
     }
 
     /// Standard error of a parameter; 0 where the model states none.
     pub fn std_error(&self, id: &str, name: &str) -> f64 {
-        let of = |p: &Map<String, Value>| p.get(name)?.get("std_error")?.as_f64();
+        let of = |e: &Effect| e.parameters.get(name)?.get("std_error")?.as_f64();
         self.entry(id).and_then(of).unwrap_or(0.0)
     }
 
-    /// A parameter of an entry.
+    /// A parameter of an effect.
     pub fn parameter(&self, id: &str, name: &str) -> Option<f64> {
-        number(self.entry(id)?, name)
+        self.entry(id)?.number(name)
     }
 }
 
 /// Share of the ray's excess over the depth that these terms hold.
 pub fn ray_share(terms: &[Term]) -> f64 {
     terms.iter().filter(|t| t.basis == RAY_FOR_DEPTH).map(|t| t.coefficients[0]).sum()
-}
-
-fn number(parameters: &Map<String, Value>, name: &str) -> Option<f64> {
-    let value = parameters.get(name)?;
-    value.get("value").unwrap_or(value).as_f64()
 }
 
 #[cfg(test)]

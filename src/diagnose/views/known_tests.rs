@@ -1,12 +1,11 @@
 //! Terms read from entries of a model file have the parameters that were written.
 
 use nalgebra::DMatrix;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::*;
 use crate::diagnose::finding::parameters::parameters as told;
 use crate::effects::Fitted;
-use crate::model::Effect;
 use crate::simulate::kinect_v1;
 use crate::terms::{Basis, Extent, PixelContext};
 

@@ -130,6 +130,19 @@ impl Survey {
         (self.block_tiles, self.by_light) = (BLOCK_TILES, false);
     }
 
+    /// Disables a part of the engine, for tests that show what it is for.
+    pub fn ablate(&mut self, ablation: Ablation, fields: &[Field]) {
+        self.ablation = ablation;
+        if ablation != Ablation::NoCorrelation {
+            return;
+        }
+        for (view, field) in self.views.iter_mut().zip(fields) {
+            view.inflation /= view.correlation.sum;
+            (view.correlation.sum, view.correlation.sum_of_squares) = (1.0, 1.0);
+            view.frames = field.frames.len() as f64;
+        }
+    }
+
     /// Mean residuals of the views, each about a plane of its own.
     pub fn mean_data(&self) -> Vec<ViewData> {
         self.views.par_iter().map(|v| mean_data(v).beside(&self.between[0])).collect()
