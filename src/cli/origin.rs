@@ -8,7 +8,8 @@ use super::common::source_date;
 use super::console::quoted;
 
 /// Flags without influence on the results.
-const FLAGS: [&str; 7] = ["--json", "--force", "--exit-zero", "-q", "--quiet", "-v", "--verbose"];
+const FLAGS: [&str; 5] = ["--json", "--force", "--exit-zero", "--quiet", "--verbose"];
+const SHORT_FLAGS: [char; 2] = ['q', 'v'];
 
 /// Origin of a page made from `recording` now (or at SOURCE_DATE_EPOCH).
 pub fn origin(recording: &Path, seed: u64) -> Origin {
@@ -22,9 +23,10 @@ pub fn origin(recording: &Path, seed: u64) -> Origin {
 fn command(typed: &[String]) -> String {
     let (mut words, mut typed) = (vec!["kinoise".to_string()], typed.iter());
     while let Some(word) = typed.next() {
-        let (name, value) = word.split_once('=').map_or((&**word, None), |(n, v)| (n, Some(v)));
+        let (name, value) = name_and_value(word);
         let mut value = || value.or_else(|| typed.next().map(String::as_str)).unwrap_or_default();
         match name {
+            "-" if word.len() > 1 => {}
             _ if FLAGS.contains(&name) => {}
             "--threads" => _ = value(),
             "-o" | "--output" => {
@@ -34,6 +36,20 @@ fn command(typed: &[String]) -> String {
         }
     }
     words.join(" ")
+}
+
+/// Name of an option and the value in the same word; short flags before an output's are dropped, and of nothing
+/// but these a dash is left.
+fn name_and_value(word: &str) -> (&str, Option<&str>) {
+    let short = word.strip_prefix('-').filter(|rest| !rest.starts_with('-'));
+    let Some(rest) = short.map(|rest| rest.trim_start_matches(SHORT_FLAGS)) else {
+        return word.split_once('=').map_or((word, None), |(name, value)| (name, Some(value)));
+    };
+    match rest.strip_prefix('o') {
+        Some("") => ("-o", None),
+        Some(value) => ("-o", Some(value.strip_prefix('=').unwrap_or(value))),
+        None => (if rest.is_empty() { "-" } else { word }, None),
+    }
 }
 
 fn name_of(folder: &Path) -> String {
@@ -52,5 +68,9 @@ mod tests {
         assert_eq!(command(&typed), "kinoise calibrate 'my rec' -o out --seed 3");
         let typed = ["map", "a'b", "--output=/tmp/m", "--threads=1"].map(String::from);
         assert_eq!(command(&typed), r"kinoise map 'a'\''b' -o m");
+        for output in ["-o/tmp/x/out", "-o=/tmp/x/out", "-qvo/tmp/x/out"] {
+            let typed = ["map", "-qv", "rec", output, "-v", "-mout", "-"].map(String::from);
+            assert_eq!(command(&typed), "kinoise map rec -o out -mout -");
+        }
     }
 }

@@ -52,7 +52,16 @@ impl Baseline {
         known.learn("spatial-correlation", "length_px", windows.exp());
         known.learn("fixed-pattern-noise", "sigma_px", fixed.max(0.0).sqrt());
         known.learn("row-noise", "sigma_px", rows.max(0.0).sqrt());
-        let still = still_level(&self.structure).filter(|share| *share > 0.0);
+        // The share by the levels that the views' differences are added to: the twins' own correlations may be
+        // skewed, and a robust mean of them is then another.
+        let at_level = |twin: &Structure| {
+            let mut at_level = twin.clone();
+            at_level.still.fixed_px2 = twin.still.fixed_px2.map(|_| fixed.max(0.0));
+            at_level.lagged = std::array::from_fn(|k| twin.lagged[k].map(|_| lags[k]));
+            at_level
+        };
+        let twins: Vec<Structure> = self.structure.iter().map(at_level).collect();
+        let still = still_level(&twins).filter(|share| *share > 0.0);
         if let Some(share) = still {
             known.learn("frozen-noise", "fraction", share);
         }

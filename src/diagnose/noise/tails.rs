@@ -4,9 +4,10 @@ use serde_json::{Map, json};
 
 use super::mixture::Mixture;
 use super::outliers::{Outliers, outliers};
+use super::some_views::Above;
 use super::structure::Structure;
 use super::tail_counts::{GAUSSIAN_TAIL, TAIL_EDGES, TailCounts};
-use super::tails_of_some::{TailedViews, tailed_views};
+use super::tails_of_some::tailed_views;
 use super::texture_finding::{EXCESS, TextureFinding};
 use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::estimate;
@@ -66,9 +67,9 @@ pub fn tails(
     let of_some = || tailed_views(views, expected, heavy);
     let comparable = !confusers.stepped && !confusers.simulated;
     let of_some = comparable.then(of_some).flatten();
-    if let Some(TailedViews { views: some, p }) = of_some.filter(|t| 2.0 * t.p <= level) {
+    if let Some(Above { views: some, of, p }) = of_some.filter(|t| 2.0 * t.p <= level) {
         let found = far_out(&some, parameters, own, p, confusers)?;
-        return Some(found.of_some([some.len(), views.len()], 2.0 * p));
+        return Some(found.of_some([some.len(), of], 2.0 * p));
     }
     let looked = mixture.is_none() && !confusers.uneven && !confusers.simulated;
     if looked { weak(views, level, parameters) } else { None }

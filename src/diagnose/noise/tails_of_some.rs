@@ -2,7 +2,7 @@
 
 use statrs::distribution::{DiscreteCDF, Poisson};
 
-use super::some_views::min_views;
+use super::some_views::{Above, min_views};
 use super::structure::Structure;
 use super::tail_counts::{MIN_READINGS, TAIL_EDGES};
 use crate::stats::{at_least, normal_beyond};
@@ -10,16 +10,9 @@ use crate::stats::{at_least, normal_beyond};
 /// A view has tails where so many far readings have a probability below this.
 const CLEAR: f64 = 1e-3;
 
-/// Views with tails that the others do not have.
-pub struct TailedViews {
-    pub views: Vec<Structure>,
-    /// P-value of so many views so far above the expected share.
-    pub p: f64,
-}
-
-/// Views whose share beyond four sigma is above `heavy`, if there are at least [`min_views`] of them. Noise
-/// alone has a share of up to `expected`.
-pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<TailedViews> {
+/// Views with tails that the others do not have: those whose share beyond four sigma is above `heavy`, if there
+/// are at least [`min_views`] of them. Noise alone has a share of up to `expected`.
+pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<Above> {
     let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > MIN_READINGS).collect();
     let tailed = |s: &&&Structure| {
         s.tails.share() > heavy * bent(s) && chance(s, expected).is_some_and(|p| p < CLEAR)
@@ -28,7 +21,8 @@ pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<Ta
     if tailed.len() < min_views(looked.len()) {
         return None;
     }
-    Some(TailedViews { views: tailed, p: order_statistic(&looked, expected)? })
+    let p = order_statistic(&looked, expected)?;
+    Some(Above { views: tailed, of: looked.len(), p })
 }
 
 /// Factor on the share beyond four sigma of the disparity for noise that is Gaussian in the depth: noise x of

@@ -9,7 +9,7 @@ use super::known::KnownTerms;
 use crate::camera::Rays;
 use crate::diagnose::edges::Edges;
 use crate::diagnose::steps::lattice::RawHistogram;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::measure::{ColumnSteps, LeftOut, TargetFrames, Workbench};
 use crate::model::SigmaModel;
@@ -78,11 +78,14 @@ pub struct Field {
 /// Residuals beyond it are excluded from the means and left to the tests of the tails.
 pub const CLIP_SIGMAS: f32 = 6.0;
 
+/// Most frames of a view: the counts of each pixel hold no more.
+const MAX_FRAMES: usize = u16::MAX as usize;
+
 impl Field {
     /// Reads the view and collects its residuals.
     ///
     /// # Errors
-    /// When no frame can be read or none shows a plane.
+    /// When no frame can be read, none shows a plane, or there are more than [`MAX_FRAMES`].
     pub fn read(
         view: &View,
         bench: &Workbench<'_>,
@@ -90,6 +93,13 @@ impl Field {
         known: &KnownTerms,
         session_start: f64,
     ) -> Result<Self> {
+        if view.depth.len() > MAX_FRAMES {
+            return Err(Error::View {
+                view: view.name.clone(),
+                what: format!("{} frames, and {MAX_FRAMES} can be counted", view.depth.len()),
+                remedy: "split it into several views",
+            });
+        }
         let (target, mut frames) = TargetFrames::of(view, bench)?;
         let (sensor, notes) = (bench.sensor, &view.notes);
         let (scale_px_m, size) = (sensor.scale_px_m(), [sensor.camera.width, sensor.camera.height]);
