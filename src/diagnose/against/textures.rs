@@ -2,6 +2,7 @@
 
 use super::Baseline;
 use crate::diagnose::noise::in_time::still_level;
+use crate::diagnose::noise::lagged::of_any_two_frames;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::texture_findings;
@@ -29,7 +30,14 @@ impl Baseline {
         let windows = level(&|s| s.window_px.map(f64::ln));
         let (fixed, rows) = (level(&|s| s.still.fixed_px2), level(&|s| s.row_px2));
         let columns = level(&|s| s.column_px2);
-        let lags: [f64; 3] = std::array::from_fn(|k| level(&|s| s.lagged[k]));
+        let still = still_level(&self.structure).filter(|share| *share > 0.0);
+        let mut lags: [f64; 3] = std::array::from_fn(|k| level(&|s| s.lagged[k]));
+        if still.is_some() {
+            // What the twins' correlations lose over the lags is no fall of the real ones: all lags get the
+            // mean over pairs of frames.
+            let frames = self.fields.iter().map(|f| f.frames.len()).max().unwrap_or(0);
+            lags = [of_any_two_frames(lags, frames); 3];
+        }
         for (s, twin) in structure.iter_mut().zip(&self.structure) {
             let differ = |real: &mut Option<f64>, twin: Option<f64>, level: f64| {
                 *real = real.zip(twin).map(|(r, t)| r - t + level);
@@ -52,7 +60,7 @@ impl Baseline {
         known.learn("spatial-correlation", "length_px", windows.exp());
         known.learn("fixed-pattern-noise", "sigma_px", fixed.max(0.0).sqrt());
         known.learn("row-noise", "sigma_px", rows.max(0.0).sqrt());
-        // The share by the levels that the views' differences are added to: the twins' own correlations may be
+        // The share in twins at the levels that the differences are added to. Their own correlations may be
         // skewed, and a robust mean of them is then another.
         let at_level = |twin: &Structure| {
             let mut at_level = twin.clone();
@@ -60,10 +68,9 @@ impl Baseline {
             at_level.lagged = std::array::from_fn(|k| twin.lagged[k].map(|_| lags[k]));
             at_level
         };
-        let twins: Vec<Structure> = self.structure.iter().map(at_level).collect();
-        let still = still_level(&twins).filter(|share| *share > 0.0);
-        if let Some(share) = still {
-            known.learn("frozen-noise", "fraction", share);
+        if still.is_some() {
+            let twins: Vec<Structure> = self.structure.iter().map(at_level).collect();
+            known.learn("frozen-noise", "fraction", still_level(&twins).unwrap_or(0.0));
         }
         let once = ["frozen-noise", "temporal-correlation", "frame-jitter", "target-motion"];
         let once = &once[usize::from(still.is_some())..];

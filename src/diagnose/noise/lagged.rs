@@ -46,3 +46,14 @@ impl Structure {
         (share, 1.0 - share)
     }
 }
+
+/// Mean correlation of two different frames of `n`, from the correlations at lags one, two, and three or more;
+/// the first of these where there is one frame.
+pub fn of_any_two_frames(lagged: [f64; 3], n: usize) -> f64 {
+    let (mut sum, mut pairs) = (0.0, 0.0);
+    for lag in 1..n {
+        sum += (n - lag) as f64 * lagged[lag.min(3) - 1];
+        pairs += (n - lag) as f64;
+    }
+    if pairs > 0.0 { sum / pairs } else { lagged[0] }
+}

@@ -12,6 +12,7 @@ use super::samples::{COARSE_PX, ViewData, coarser};
 use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
 use super::tiles::{Tile, roughen, tiles};
 use crate::diagnose::checks::replication::halves;
+use crate::diagnose::noise::lagged::of_any_two_frames;
 use crate::diagnose::options::Ablation;
 use crate::diagnose::search::view_levels::{MODEL_TOLERANCE, view_scatter};
 use crate::effects::Flat;
@@ -201,13 +202,7 @@ impl Survey {
             if n < 2 {
                 continue;
             }
-            // Mean correlation of two different frames.
-            let (mut sum, mut pairs) = (0.0, 0.0);
-            for lag in 1..n {
-                sum += (n - lag) as f64 * common[lag.min(3) - 1];
-                pairs += (n - lag) as f64;
-            }
-            let mean = (sum / pairs).clamp(0.0, 0.9);
+            let mean = of_any_two_frames(common, n).clamp(0.0, 0.9);
             view.between_frame_factor =
                 (mean < 0.9).then(|| n as f64 / (n as f64 - 1.0) / (1.0 - mean));
             view.frames = view.frames.min(n as f64 - 1.0);
