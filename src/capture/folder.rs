@@ -21,6 +21,8 @@ pub struct Growing {
     seen: BTreeSet<PathBuf>,
     /// Images not read yet, oldest last.
     waiting: Vec<PathBuf>,
+    /// When the first of them could not be read for the first time.
+    unread_since: Option<Instant>,
     remarks: Vec<String>,
 }
 
@@ -36,7 +38,8 @@ impl Growing {
         let first = first_image(root, patience)?;
         let (sensor, remarks) = describe_folder(root, &[FrameRef::file(0.0, first)], assumed)?;
         let seen = BTreeSet::new();
-        Ok(Growing { root: root.into(), sensor, seen, waiting: Vec::new(), remarks })
+        let (waiting, unread_since) = (Vec::new(), None);
+        Ok(Growing { root: root.into(), sensor, seen, waiting, unread_since, remarks })
     }
 
     /// The next image once it can be read; later ones wait for it.
@@ -50,10 +53,14 @@ impl Growing {
         let (width, height) = (self.sensor.camera.width, self.sensor.camera.height);
         let read = read_depth(&FrameRef::file(0.0, path.clone()), width, height);
         let modified = modified(path);
-        // Another machine's clock may be ahead.
-        if read.is_err() && !modified.elapsed().is_ok_and(|age| age >= MAX_WRITING) {
-            return None;
+        if read.is_err() {
+            // Another machine's clock may be ahead.
+            let since = self.unread_since.get_or_insert_with(Instant::now);
+            if modified.elapsed().map_or(since.elapsed(), |age| age) < MAX_WRITING {
+                return None;
+            }
         }
+        self.unread_since = None;
         self.seen.extend(self.waiting.pop());
         let stamp = modified.duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64());
         match read {

@@ -38,8 +38,8 @@ fn command(typed: &[String]) -> String {
     words.join(" ")
 }
 
-/// Name of an option and the value in the same word; short flags before an output's are dropped, and of nothing
-/// but these a dash is left.
+/// Name of an option and the value in the same word. Short flags before `o` are dropped; a word of such flags
+/// alone gives "-".
 fn name_and_value(word: &str) -> (&str, Option<&str>) {
     let short = word.strip_prefix('-').filter(|rest| !rest.starts_with('-'));
     let Some(rest) = short.map(|rest| rest.trim_start_matches(SHORT_FLAGS)) else {

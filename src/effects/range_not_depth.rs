@@ -23,6 +23,8 @@ pub(super) static CARD: Card = Card {
     confused_with: "radial-disparity-bias, which grows with z^2 and has any size: this one grows with z and is z r^2 / (2 f^2), no more and no less",
     reference: "geometry: 1 / cos of the angle off the axis; 5.8 % at 200 px from the middle of a Kinect",
     formula_error: 0.07,
+    // A share: all of it or nothing.
+    usual: 1.0,
     ..Card::BASE
 };
 

@@ -1,7 +1,5 @@
 //! Lost pixels at the target's border: which lie on the target and which beside it.
 
-use std::ops::Range;
-
 use super::grow::Lattice;
 use super::image::InverseDepthImage;
 
@@ -41,22 +39,26 @@ pub(super) fn beside(
     reached
 }
 
-/// Widest gap of lost pixels that is bridged, px on either side.
-const GAP: usize = 2;
+/// Longest run of lost pixels that is bridged.
+const MAX_RUN: usize = 2;
 
-/// Whether pixel `i` lies between two of `these` in its row or its column. Lost at random at the target's
-/// border, it is the target's all the same.
+/// Whether the lost pixel `i` is in a short run of such pixels between two that fit, in its row or its column.
+/// Lost at random at the target's border, it is the target's all the same.
 pub(super) fn is_enclosed(
     i: usize,
     [width, height]: [usize; 2],
-    these: &impl Fn(usize) -> bool,
+    lost: &impl Fn(usize) -> bool,
+    fits: &impl Fn(usize) -> bool,
 ) -> bool {
     let (u, v) = (i % width, i / width);
-    let across = |mut us: Range<usize>| us.any(|u| these(v * width + u));
-    let along = |mut vs: Range<usize>| vs.any(|v| these(v * width + u));
-    let after = |at: usize, end: usize| at + 1..(at + 1 + GAP).min(end);
-    across(u.saturating_sub(GAP)..u) && across(after(u, width))
-        || along(v.saturating_sub(GAP)..v) && along(after(v, height))
+    let end = |at: &dyn Fn(usize) -> usize, room: usize| {
+        let k = (1..=room.min(MAX_RUN)).find(|k| !lost(at(*k)))?;
+        fits(at(k)).then_some(k)
+    };
+    let is_short =
+        |ends: [Option<usize>; 2]| matches!(ends, [Some(a), Some(b)] if a + b <= MAX_RUN + 1);
+    is_short([end(&|k| i - k, u), end(&|k| i + k, width - 1 - u)])
+        || is_short([end(&|k| i - k * width, v), end(&|k| i + k * width, height - 1 - v)])
 }
 
 #[cfg(test)]
@@ -65,12 +67,18 @@ mod tests {
 
     #[test]
     fn a_hole_in_the_border_is_the_targets_and_the_ground_beside_it_is_not() {
-        const SIZE: [usize; 2] = [9, 6];
-        // The left five columns, the last of them the border, with a hole of one pixel and one of two.
-        let holes = [13, 31, 40];
-        let these = |i: usize| i % 9 < 5 && !holes.contains(&i);
-        let enclosed: Vec<usize> =
-            (0..54).filter(|&i| !these(i) && is_enclosed(i, SIZE, &these)).collect();
-        assert_eq!(enclosed, holes);
+        const SIZE: [usize; 2] = [9, 8];
+        // The left five columns, the last of them the border, with holes of one, two and three pixels; the one at
+        // the lower end is beside something that does not fit.
+        let border = |rows: std::ops::Range<usize>| rows.map(|row| row * 9 + 4);
+        let bridged: Vec<usize> = border(1..2).chain(border(3..5)).collect();
+        let clutter = 6 * 9 + 4;
+        let fits = |i: usize| i % 9 < 5 && !bridged.contains(&i) && i < clutter;
+        let lost = |i: usize| !fits(i) && i != clutter;
+        let enclosed = |i: &usize| lost(*i) && is_enclosed(*i, SIZE, &lost, &fits);
+        assert_eq!((0..72).filter(enclosed).collect::<Vec<_>>(), bridged);
+        let wide = |i: usize| i % 9 < 5 && !border(2..5).any(|hole| hole == i);
+        let lost = |i: usize| !wide(i);
+        assert!(!border(2..5).any(|i| is_enclosed(i, SIZE, &lost, &wide)), "three in a row");
     }
 }

@@ -268,8 +268,9 @@ fn finish(
             continue;
         }
         // Near the edge only pixels that fit, or lost ones between those: others may show something else.
-        let lost = || !image.valid(i) && is_enclosed(i, [width, image.w.len() / width], &fits);
-        if !core[node] && !fits(i) && !lost() {
+        let lost = |i: usize| !image.valid(i);
+        let enclosed = || lost(i) && is_enclosed(i, [width, image.w.len() / width], &lost, &fits);
+        if !core[node] && !fits(i) && !enclosed() {
             continue;
         }
         if trimmed[node] || keep_edge {

@@ -32,9 +32,10 @@ impl Baseline {
         let columns = level(&|s| s.column_px2);
         let still = still_level(&self.structure).filter(|share| *share > 0.0);
         let mut lags: [f64; 3] = std::array::from_fn(|k| level(&|s| s.lagged[k]));
-        if still.is_some() {
-            // What the twins' correlations lose over the lags is no fall of the real ones: all lags get the
-            // mean over pairs of frames.
+        let fades = self.textures.iter().any(|t| t.families.contains(&"temporal-correlation"));
+        if still.is_some() && !fades {
+            // What the twins' correlations lose over the lags by chance is no fall of the real ones: all lags
+            // get the mean over pairs of frames.
             let frames = self.fields.iter().map(|f| f.frames.len()).max().unwrap_or(0);
             lags = [of_any_two_frames(lags, frames); 3];
         }
@@ -63,10 +64,10 @@ impl Baseline {
         // The share in twins at the levels that the differences are added to. Their own correlations may be
         // skewed, and a robust mean of them is then another.
         let at_level = |twin: &Structure| {
-            let mut at_level = twin.clone();
-            at_level.still.fixed_px2 = twin.still.fixed_px2.map(|_| fixed.max(0.0));
-            at_level.lagged = std::array::from_fn(|k| twin.lagged[k].map(|_| lags[k]));
-            at_level
+            let mut twin = twin.clone();
+            twin.still.fixed_px2 = twin.still.fixed_px2.map(|_| fixed.max(0.0));
+            twin.lagged = std::array::from_fn(|k| twin.lagged[k].map(|_| lags[k]));
+            twin
         };
         if still.is_some() {
             let twins: Vec<Structure> = self.structure.iter().map(at_level).collect();

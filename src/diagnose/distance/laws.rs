@@ -115,9 +115,9 @@ impl<'a> References<'a> {
     }
 }
 
-/// Fits all laws, with their gains on references left out; none where there are too few references. `bent_m`
-/// lie between a bent target and the place on it that was measured, at all distances; `open` are biases with an
-/// undetermined constant, which cannot be told from an offset of the disparity.
+/// Fits all laws, with their gains on references left out; none where there are too few references. `bent_m` is
+/// the distance between a bent target and the place on it that was measured, the same at all distances; `open`
+/// are biases with an undetermined constant, which cannot be told from an offset of the disparity.
 pub fn laws(checked: &[ReferencedView], bent_m: f64, open: &[Family]) -> Vec<Law> {
     if checked.len() < MIN_VIEWS {
         return Vec::new();

@@ -40,8 +40,8 @@ pub struct Patch {
     pub asked: f64,
 }
 
-/// Converts the patches to cells. So many readings are lost `together`.
-pub fn cells(patches: &[Vec<Patch>], together: f64) -> Vec<Vec<Cell<'_>>> {
+/// Converts the patches to cells. In each view so many readings are lost `together`.
+pub fn cells<'a>(patches: &'a [Vec<Patch>], together: &[f64]) -> Vec<Vec<Cell<'a>>> {
     fn of_view(view: &[Patch], together: f64) -> Vec<Cell<'_>> {
         let usual = usual_share(view);
         let cell = |&Patch { ref place, lost, asked }| Cell {
@@ -53,10 +53,10 @@ pub fn cells(patches: &[Vec<Patch>], together: f64) -> Vec<Vec<Cell<'_>>> {
         };
         view.iter().map(cell).collect()
     }
-    patches.iter().map(|view| of_view(view, together)).collect()
+    patches.iter().zip(together).map(|(view, together)| of_view(view, *together)).collect()
 }
 
-/// Share that half of the readings asked for lie below, patch by patch: a clump does not move it.
+/// Median of the patches' shares, weighted by the readings asked for: a clump does not move it.
 fn usual_share(view: &[Patch]) -> f64 {
     let mut shares: Vec<[f64; 2]> = view.iter().map(|p| [p.lost / p.asked, p.asked]).collect();
     shares.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -108,12 +108,14 @@ fn key(cell: &Cell<'_>, rim: f64) -> (u32, u32, bool) {
 /// twin.
 pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) -> Vec<Vec<f64>> {
     let of_view = |(mine, theirs): (&mut Vec<Cell<'_>>, &Vec<Cell<'_>>)| {
-        let lost: BTreeMap<_, f64> =
-            theirs.iter().map(|c| (key(c, rim), c.odds() - odds(0.0))).collect();
-        mine.retain(|c| lost.contains_key(&key(c, rim)));
-        let expected: Vec<f64> = mine.iter().map(|c| lost[&key(c, rim)]).collect();
-        let loses: Vec<bool> =
-            mine.iter().zip(&expected).map(|(c, e)| c.lost > 0.0 || *e > 0.0).collect();
+        let theirs: BTreeMap<_, _> =
+            theirs.iter().map(|c| (key(c, rim), (c.odds() - odds(0.0), c.lost > 0.0))).collect();
+        mine.retain(|c| theirs.contains_key(&key(c, rim)));
+        let (expected, loses): (Vec<f64>, Vec<bool>) = mine
+            .iter()
+            .map(|c| (c, theirs[&key(c, rim)]))
+            .map(|(c, (expected, loses))| (expected, loses || c.lost > 0.0))
+            .unzip();
         // A clump seen in one run could have lain next to it in the other.
         let differs: Vec<bool> = (0..mine.len())
             .map(|i| (0..mine.len()).any(|j| loses[j] && touch(&mine[i], &mine[j])))

@@ -4,7 +4,32 @@ use std::collections::BTreeMap;
 
 use super::cells::{Cell, Neighbours};
 use super::points::part;
+use crate::diagnose::views::field::Field;
+use crate::diagnose::views::tiles::SIDE;
 use crate::stats::range;
+
+/// Number of a pixel's readings that are lost together, view by view: one where each frame fails by itself, all
+/// where the pixel is dead. The variance of the pixels' losses within a tile over that of single losses.
+pub fn frames_together(fields: &[Field]) -> Vec<f64> {
+    let of_view = |field: &Field| {
+        let frames = field.frames.len() as f64;
+        let mut tiles: BTreeMap<(usize, usize), [f64; 3]> = BTreeMap::new();
+        for (&i, &measured) in field.pixels.iter().zip(&field.measured) {
+            let (u, v) = (i as usize % field.width, i as usize / field.width);
+            let lost = frames - f64::from(measured);
+            let sum = tiles.entry((u / SIDE, v / SIDE)).or_default();
+            *sum = [sum[0] + 1.0, sum[1] + lost, sum[2] + lost * lost];
+        }
+        let spread = |&[n, lost, squares]: &[f64; 3]| {
+            let share = lost / (n * frames);
+            [squares - lost * lost / n, (n - 1.0) * frames * share * (1.0 - share)]
+        };
+        let [seen, single] =
+            tiles.values().map(spread).fold([0.0; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
+        if single > 0.0 { (seen / single).clamp(1.0, frames) } else { 1.0 }
+    };
+    fields.iter().map(of_view).collect()
+}
 
 /// Parts of a view's reach along an axis.
 pub const PARTS: usize = 64;
@@ -68,7 +93,6 @@ mod tests {
     use crate::rng::Seed;
     use crate::terms::PixelContext;
 
-    const SIDE: usize = 4;
     const ACROSS: usize = 40;
     const FRAMES: usize = 4;
 
@@ -95,7 +119,7 @@ mod tests {
     #[test]
     fn single_losses_are_single_however_they_rise_along_the_axis() {
         let along = |sign: f64, view: &[Patch]| {
-            clump(&cells(&[view.to_vec()], 1.0), &|c: &Cell<'_>| sign * c.place.u)
+            clump(&cells(&[view.to_vec()], &[1.0]), &|c: &Cell<'_>| sign * c.place.u)
         };
         let even = along(1.0, &view(|_| 0.01, |_, _| false));
         let rising = view(|u| 0.3 * (-u / 10.0).exp(), |_, _| false);
@@ -112,5 +136,35 @@ mod tests {
         assert!(against > 5.0, "{against}");
         assert!((3.0..6.0).contains(&pixels), "{pixels}");
         assert!(holes.iter().all(|events| *events < 6.0), "{holes:?}");
+    }
+
+    /// A law over the picture does not pass for dead pixels.
+    #[test]
+    fn dead_pixels_lose_all_frames_and_failed_matches_one() {
+        let mut rng = Seed(4).stream("frames together");
+        let mut field = |chance: &dyn Fn(usize) -> f64, dead: f64| {
+            let (width, height) = (160, 120);
+            let measured = (0..width * height).map(|i| {
+                let frames = 0..FRAMES as u16;
+                if rng.random_bool(dead) {
+                    return 0;
+                }
+                frames.filter(|_| !rng.random_bool(chance(i % width))).count() as u16
+            });
+            let measured = measured.collect();
+            let pixels = (0..(width * height) as u32).collect();
+            let frames = vec![(0.0, 0.0); FRAMES];
+            Field { width, height, pixels, measured, frames, ..Field::default() }
+        };
+        let fields = [
+            field(&|_| 0.02, 0.0),
+            field(&|u| 0.5 * (u as f64 / 160.0).powi(4), 0.0),
+            field(&|_| 0.0, 0.02),
+            field(&|_| 0.0, 0.0),
+        ];
+        let [single, law, dead, none] = frames_together(&fields)[..] else { panic!("four") };
+        assert!((1.0..1.1).contains(&single) && (1.0..1.1).contains(&law), "{single} {law}");
+        assert!(dead > 0.95 * FRAMES as f64, "{dead}");
+        assert_eq!(none, 1.0);
     }
 }

@@ -46,7 +46,7 @@ fn fall(over: f64) -> f64 {
 }
 
 fn found((patches, reach): &(Vec<Vec<Patch>>, Extent)) -> Option<Axis> {
-    few_losses(&cells(patches, 1.0), 8.0, reach, 0.001, Seed(1))
+    few_losses(&cells(patches, &vec![1.0; patches.len()]), 8.0, reach, 0.001, Seed(1))
         .map(|(judged, _)| judged.shape.axis())
 }
 
@@ -73,7 +73,8 @@ fn a_foot_that_begins_in_the_midst_of_the_session_is_seen() {
     let (mut patches, reach) =
         session(|v, i| f64::from(u8::from(v == 9 && rng.random_bool(fall(1.0 - right(i))))));
     let step = |patches: &[Vec<Patch>]| {
-        let (judged, _) = few_losses(&cells(patches, 1.0), 8.0, &reach, 0.001, Seed(1))?;
+        let (judged, _) =
+            few_losses(&cells(patches, &vec![1.0; patches.len()]), 8.0, &reach, 0.001, Seed(1))?;
         let Shape::Step(step) = judged.shape else { return None };
         Some((step.axis, step.since_s))
     };

@@ -29,7 +29,7 @@ use crate::diagnose::views::tiles::rim_px;
 use crate::rng::Seed;
 use crate::terms::{Axis, Extent};
 use cells::{Cell, MIN_SCATTER, USUAL, cells, expected, fine, patches};
-use clumps::clump;
+use clumps::frames_together;
 use dropout_cells::DropoutCells;
 use few::few_losses;
 use hard_end::{CloseLook, HardEnd, blur};
@@ -85,13 +85,10 @@ pub fn missing(
     let second = survey.second();
     let margins = Margins::of(fields);
     let (large, fine) = (patches(survey, camera, &margins), fine(survey, &margins));
-    // A dead pixel is lost in all frames, and a failed match in one.
-    let frames = fields.iter().map(|f| f.frames.len()).max().unwrap_or(1);
-    let together = clump(&fine, &|_| 0.0).min(frames.max(1) as f64);
-    let mut mine = cells(&large, together);
-    let expected = twins.map(|(_, survey)| {
+    let mut mine = cells(&large, &frames_together(fields));
+    let expected = twins.map(|(fields, survey)| {
         let twins = patches(survey, camera, &margins);
-        expected(&mut mine, &cells(&twins, together), rim_px(camera))
+        expected(&mut mine, &cells(&twins, &frames_together(fields)), rim_px(camera))
     });
     let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
     let look = CloseLook {

@@ -103,7 +103,12 @@ impl<'a> Losses<'a> {
             .map(|(cells, e)| cells.iter().zip(e).map(|(c, e)| c.odds() - e).collect())
             .collect();
         let whiteners = views.iter().map(|v| Whitener::of(v, USUAL)).collect();
-        let level = usual(&left).max(odds(0.0));
+        // A median has no such bias.
+        let as_counted = views
+            .iter()
+            .zip(&left)
+            .map(|(cells, left)| cells.iter().zip(left).map(|(c, y)| y + c.bias).collect());
+        let level = usual(&as_counted.collect::<Vec<_>>()).max(odds(0.0));
         let mut losses = Losses { views, left, base: share(level), whiteners };
         losses.left.iter_mut().flatten().for_each(|y| *y -= level);
         losses

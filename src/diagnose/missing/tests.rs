@@ -81,11 +81,12 @@ fn find_beside(
     reach.theta = of(|p| p.theta);
     reach.session = of(|p| p.session_s);
     reach.light = [1.0, 1.0];
-    let mut mine = cells(views, 1.0);
-    let expected = twins.map(|twins| expected(&mut mine, &cells(twins, 1.0), rim_px(camera)));
+    let mut mine = cells(views, &vec![1.0; views.len()]);
+    let expected = twins
+        .map(|twins| expected(&mut mine, &cells(twins, &vec![1.0; twins.len()]), rim_px(camera)));
     let seen = DropoutCells {
         cells: mine,
-        fine: cells(views, 1.0),
+        fine: cells(views, &vec![1.0; views.len()]),
         region_given: vec![true; views.len()],
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
         expected,

@@ -96,7 +96,7 @@ impl Field {
         if view.depth.len() > MAX_FRAMES {
             return Err(Error::View {
                 view: view.name.clone(),
-                what: format!("{} frames, and {MAX_FRAMES} can be counted", view.depth.len()),
+                what: format!("{} frames, of which {MAX_FRAMES} can be counted", view.depth.len()),
                 remedy: "split it into several views",
             });
         }
