@@ -24,27 +24,17 @@ impl Baseline {
         real: &Quantisation,
         known: &mut KnownTerms,
     ) {
-        let level = |of: &dyn Fn(&Structure) -> Option<f64>| {
-            mean(self.structure.iter().filter_map(of)).unwrap_or(0.0)
-        };
-        let windows = level(&|s| s.window_px.map(f64::ln));
-        let (fixed, rows) = (level(&|s| s.still.fixed_px2), level(&|s| s.row_px2));
-        let columns = level(&|s| s.column_px2);
-        let still = still_level(&self.structure).filter(|share| *share > 0.0);
-        let mut lags: [f64; 3] = std::array::from_fn(|k| level(&|s| s.lagged[k]));
-        let fades = self.textures.iter().any(|t| t.families.contains(&"temporal-correlation"));
-        if still.is_some() && !fades {
-            // What the twins' correlations lose over the lags by chance is no fall of the real ones: all lags
-            // get the mean over pairs of frames.
-            let frames = self.fields.iter().map(|f| f.frames.len()).max().unwrap_or(0);
-            lags = [of_any_two_frames(lags, frames); 3];
-        }
+        let windows = self.level(|s| s.window_px.map(f64::ln));
+        let fixed = self.level(|s| s.still.fixed_px2).max(0.0);
+        let (rows, columns) = (self.level(|s| s.row_px2), self.level(|s| s.column_px2));
+        let stands = still_level(&self.structure).is_some_and(|share| share > 0.0);
+        let lags = self.lags(stands);
         for (s, twin) in structure.iter_mut().zip(&self.structure) {
             let differ = |real: &mut Option<f64>, twin: Option<f64>, level: f64| {
                 *real = real.zip(twin).map(|(r, t)| r - t + level);
             };
             s.window_px = s.window_px.zip(twin.window_px).map(|(r, t)| r / t * windows.exp());
-            differ(&mut s.still.fixed_px2, twin.still.fixed_px2, fixed.max(0.0));
+            differ(&mut s.still.fixed_px2, twin.still.fixed_px2, fixed);
             differ(&mut s.row_px2, twin.row_px2, rows.max(0.0));
             // Nothing is known of columns: what both have must cancel.
             differ(&mut s.column_px2, twin.column_px2, columns.min(0.0));
@@ -59,22 +49,13 @@ impl Baseline {
             }
         }
         known.learn("spatial-correlation", "length_px", windows.exp());
-        known.learn("fixed-pattern-noise", "sigma_px", fixed.max(0.0).sqrt());
+        known.learn("fixed-pattern-noise", "sigma_px", fixed.sqrt());
         known.learn("row-noise", "sigma_px", rows.max(0.0).sqrt());
-        // The share in twins at the levels that the differences are added to. Their own correlations may be
-        // skewed, and a robust mean of them is then another.
-        let at_level = |twin: &Structure| {
-            let mut twin = twin.clone();
-            twin.still.fixed_px2 = twin.still.fixed_px2.map(|_| fixed.max(0.0));
-            twin.lagged = std::array::from_fn(|k| twin.lagged[k].map(|_| lags[k]));
-            twin
-        };
-        if still.is_some() {
-            let twins: Vec<Structure> = self.structure.iter().map(at_level).collect();
-            known.learn("frozen-noise", "fraction", still_level(&twins).unwrap_or(0.0));
+        if stands {
+            known.learn("frozen-noise", "fraction", self.still_at(lags, fixed));
         }
         let once = ["frozen-noise", "temporal-correlation", "frame-jitter", "target-motion"];
-        let once = &once[usize::from(still.is_some())..];
+        let once = &once[usize::from(stands)..];
         for texture in &self.textures {
             for id in once.iter().filter(|id| texture.families.contains(id)) {
                 for (name, value) in &texture.parameters {
@@ -93,6 +74,37 @@ impl Baseline {
                 known.learn(id, parameter, 0.0);
             }
         }
+    }
+
+    /// Mean over the simulated views; 0 without any.
+    fn level(&self, of: impl Fn(&Structure) -> Option<f64>) -> f64 {
+        mean(self.structure.iter().filter_map(of)).unwrap_or(0.0)
+    }
+
+    /// Correlation at each lag that the differences from the twins' are added to. What the twins' lose over the
+    /// lags by chance is no fall of the real ones: where their noise `stands` and does not fade, all lags get
+    /// the mean over pairs of frames.
+    fn lags(&self, stands: bool) -> [f64; 3] {
+        let lags = std::array::from_fn(|k| self.level(|s| s.lagged[k]));
+        let fades = self.textures.iter().any(|t| t.families.contains(&"temporal-correlation"));
+        if !stands || fades {
+            return lags;
+        }
+        let frames = self.fields.iter().map(|f| f.frames.len()).max().unwrap_or(0);
+        [of_any_two_frames(lags, frames); 3]
+    }
+
+    /// Share that stands still in twins of these correlations and this pattern. Their own correlations may be
+    /// skewed, and a robust mean of them is then another.
+    fn still_at(&self, lags: [f64; 3], fixed_px2: f64) -> f64 {
+        let at_level = |twin: &Structure| {
+            let mut twin = twin.clone();
+            twin.still.fixed_px2 = twin.still.fixed_px2.map(|_| fixed_px2);
+            twin.lagged = std::array::from_fn(|k| twin.lagged[k].map(|_| lags[k]));
+            twin
+        };
+        let twins: Vec<Structure> = self.structure.iter().map(at_level).collect();
+        still_level(&twins).unwrap_or(0.0)
     }
 
     /// Whether the recording's tails are not much heavier than the simulation's.

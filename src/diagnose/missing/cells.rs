@@ -26,9 +26,9 @@ pub struct Cell<'a> {
 }
 
 impl Cell<'_> {
-    /// Log odds of the share lost.
+    /// Log odds of the share lost, as counted: with their bias.
     pub fn odds(&self) -> f64 {
-        odds(self.lost / self.asked) - self.bias
+        odds(self.lost / self.asked)
     }
 }
 
@@ -108,8 +108,10 @@ fn key(cell: &Cell<'_>, rim: f64) -> (u32, u32, bool) {
 /// twin.
 pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) -> Vec<Vec<f64>> {
     let of_view = |(mine, theirs): (&mut Vec<Cell<'_>>, &Vec<Cell<'_>>)| {
-        let theirs: BTreeMap<_, _> =
-            theirs.iter().map(|c| (key(c, rim), (c.odds() - odds(0.0), c.lost > 0.0))).collect();
+        let theirs: BTreeMap<_, _> = theirs
+            .iter()
+            .map(|c| (key(c, rim), (c.odds() - c.bias - odds(0.0), c.lost > 0.0)))
+            .collect();
         mine.retain(|c| theirs.contains_key(&key(c, rim)));
         let (expected, loses): (Vec<f64>, Vec<bool>) = mine
             .iter()

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::cells::{Cell, Neighbours};
 use super::points::part;
 use crate::diagnose::views::field::Field;
@@ -13,22 +15,26 @@ use crate::stats::range;
 pub fn frames_together(fields: &[Field]) -> Vec<f64> {
     let of_view = |field: &Field| {
         let frames = field.frames.len() as f64;
-        let mut tiles: BTreeMap<(usize, usize), [f64; 3]> = BTreeMap::new();
+        let down = field.height.div_ceil(SIDE);
+        let mut tiles = vec![[0.0; 3]; field.width.div_ceil(SIDE) * down];
         for (&i, &measured) in field.pixels.iter().zip(&field.measured) {
             let (u, v) = (i as usize % field.width, i as usize / field.width);
             let lost = frames - f64::from(measured);
-            let sum = tiles.entry((u / SIDE, v / SIDE)).or_default();
+            let sum = &mut tiles[u / SIDE * down + v / SIDE];
             *sum = [sum[0] + 1.0, sum[1] + lost, sum[2] + lost * lost];
         }
         let spread = |&[n, lost, squares]: &[f64; 3]| {
             let share = lost / (n * frames);
             [squares - lost * lost / n, (n - 1.0) * frames * share * (1.0 - share)]
         };
-        let [seen, single] =
-            tiles.values().map(spread).fold([0.0; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
+        let [seen, single] = tiles
+            .iter()
+            .filter(|t| t[0] > 0.0)
+            .map(spread)
+            .fold([0.0; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
         if single > 0.0 { (seen / single).clamp(1.0, frames) } else { 1.0 }
     };
-    fields.iter().map(of_view).collect()
+    fields.par_iter().map(of_view).collect()
 }
 
 /// Parts of a view's reach along an axis.

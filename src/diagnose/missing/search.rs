@@ -97,21 +97,18 @@ fn dot(g: &[f32], w: &[f64]) -> f64 {
 impl<'a> Losses<'a> {
     /// Subtracts `explained`, which is in log odds above the base.
     pub fn new(views: &'a [Vec<Cell<'a>>], explained: &[Vec<f64>]) -> Self {
-        let left: Vec<Vec<f64>> = views
+        let mut left: Vec<Vec<f64>> = views
             .iter()
             .zip(explained)
             .map(|(cells, e)| cells.iter().zip(e).map(|(c, e)| c.odds() - e).collect())
             .collect();
+        // A median of counts has no bias.
+        let level = usual(&left).max(odds(0.0));
+        for (y, c) in left.iter_mut().flatten().zip(views.iter().flatten()) {
+            *y -= c.bias + level;
+        }
         let whiteners = views.iter().map(|v| Whitener::of(v, USUAL)).collect();
-        // A median has no such bias.
-        let as_counted = views
-            .iter()
-            .zip(&left)
-            .map(|(cells, left)| cells.iter().zip(left).map(|(c, y)| y + c.bias).collect());
-        let level = usual(&as_counted.collect::<Vec<_>>()).max(odds(0.0));
-        let mut losses = Losses { views, left, base: share(level), whiteners };
-        losses.left.iter_mut().flatten().for_each(|y| *y -= level);
-        losses
+        Losses { views, left, base: share(level), whiteners }
     }
 
     /// Re-estimates the scatter from what `best` leaves, bounded below by `min_scatter`.

@@ -247,3 +247,29 @@ impl Field {
         on
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::MeasureOptions;
+    use crate::model::NoiseModel;
+    use crate::simulate::kinect_v1;
+    use crate::view::{FrameRef, ViewNotes};
+
+    /// A count that wrapped would read as 94 % of 70,000 readings lost.
+    #[test]
+    fn a_view_of_more_frames_than_a_pixel_counts_is_left_out() {
+        let sensor = kinect_v1(4);
+        let bench = Workbench::new(&sensor, MeasureOptions::default());
+        let sigma = NoiseModel::paper().sigma;
+        let why = |frames: usize| {
+            let depth = vec![FrameRef::file(0.0, "none.png".into()); frames];
+            let (infrared, notes) = (Vec::new(), ViewNotes::default());
+            let view = View { name: "0000".into(), depth, infrared, notes };
+            let field = Field::read(&view, &bench, &sigma, &KnownTerms::default(), 0.0);
+            field.expect_err("no such file").to_string()
+        };
+        assert!(why(65_536).contains("65536 frames, of which 65535 can be counted"));
+        assert!(!why(4).contains("counted"), "{}", why(4));
+    }
+}
