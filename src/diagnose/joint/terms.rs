@@ -77,7 +77,7 @@ impl Joint<'_> {
         if let Some(mapped) = self.best_maps(&kept) {
             let better = total(&mapped.scores) - total(&settled.scores);
             let slack = MAPS_SHARE * total(&mapped.scores);
-            let clear = behind(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
+            let clear = in_each_fold(&mapped.scores, &settled.scores) > MAPS_CLEARLY;
             // A remainder found by the search is left to the maps, unless they are worse.
             let seen = kept.len() < settled.terms.len();
             let alone = self.scores(&settled.without, &kept, |_| true);
@@ -89,7 +89,7 @@ impl Joint<'_> {
                 self.drop_idle(&mut settled, chosen, total(&alone));
                 settled.maps = total(&settled.scores) - total(&alone);
                 let freedom = alone.len().saturating_sub(1).max(1) as f64;
-                settled.maps_p = student_upper(behind(&settled.scores, &alone), freedom);
+                settled.maps_p = student_upper(in_each_fold(&settled.scores, &alone), freedom);
             }
         }
         if settled.penalty.is_none() {
@@ -247,6 +247,21 @@ fn brings_less_than(share: f64) -> impl Fn(&Settled, usize, f64, &[f64]) -> bool
 
 pub fn total(scores: &[f64]) -> f64 {
     scores.iter().sum()
+}
+
+/// Added to a fold's scores, as a share of the folds' mean: what a fold without evidence prefers is chance.
+const LEAST_FOLD: f64 = 0.1;
+
+/// How much better the winner is, in standard errors over the folds, where each fold's difference is a share of
+/// its scores. A fold may hold ten times the evidence of another; in nats, its gain alone would make the mean
+/// uncertain.
+fn in_each_fold(winner: &[f64], rival: &[f64]) -> f64 {
+    let pairs = || winner.iter().zip(rival);
+    let size = |(w, r): (&f64, &f64)| w.abs() + r.abs();
+    let least = LEAST_FOLD * pairs().map(size).sum::<f64>() / winner.len().max(1) as f64;
+    let share = |(w, r): (&f64, &f64)| (w - r) / (size((w, r)) + least).max(f64::MIN_POSITIVE);
+    let shares: Vec<f64> = pairs().map(share).collect();
+    behind(&shares, &vec![0.0; shares.len()])
 }
 
 /// Whether the maps can express the same, and more.

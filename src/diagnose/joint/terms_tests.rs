@@ -28,6 +28,18 @@ fn a_bowl_alone_needs_no_maps_and_keeps_its_size() {
     assert!((k - 0.3).abs() < 0.01, "{k}");
 }
 
+/// One near view may hold most of the evidence, and most of what the maps gain. That the others gain as large a
+/// share is what counts.
+#[test]
+fn a_view_of_much_evidence_does_not_make_maps_uncertain() {
+    let rng = &mut Seed(9).stream("joint/heavy");
+    let mut data = session([0.8, 3.0], rng, |p| 0.3 * p.radius.powi(2) + 0.5 * smooth(p));
+    data[0].weight.iter_mut().for_each(|w| *w *= 30.0);
+    let outcome = fitted(&data, vec![bowl()]);
+    let maps = |c: &&Chosen| matches!(c.candidate.basis, Basis::Spline { .. });
+    assert_eq!(outcome.chosen.iter().filter(maps).count(), 2);
+}
+
 /// A wave and a curve over the same columns: the wave explains it all, and keeps its size.
 #[test]
 fn a_nameless_curve_does_not_share_what_a_name_says() {
