@@ -137,8 +137,8 @@ impl Case<'_> {
         forget_impossible(&mut found, self.sensor().kind);
         found.extend(of_few_views);
         tell_lines_once(&mut found);
-        if self.baseline.is_some() {
-            symptoms(&mut found);
+        if let Some(baseline) = &self.baseline {
+            symptoms(&mut found, baseline.has_a_window);
         }
         echoes(&mut found);
         merge(&mut found);

@@ -11,8 +11,8 @@ use super::noise::still::{KeptPattern, beside_bias, still};
 use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
 use super::search::rules::LATER_LEVEL;
-use super::steps::lattice;
 use super::steps::lattice::Quantisation;
+use super::steps::measure_steps;
 use super::views::column_steps::column_steps;
 use super::views::field::Field;
 use super::views::known::KnownTerms;
@@ -94,7 +94,7 @@ impl<'a> Case<'a> {
         let in_both = baseline.as_ref().is_some_and(|b| b.fields.iter().any(steps));
         let column_steps = column_steps(&fields, &known).filter(|_| !in_both);
         progress.stage("comparing with the model");
-        let lattice = lattice(&fields, recording);
+        let lattice = measure_steps(&mut fields, recording, &bench.rays);
         let kept = KeptPattern::of(&fields);
         let learnt = (learnt_from(model, &known, options, simulated.is_some()), &known);
         let survey = survey((&fields, &kept), &bench, baseline.as_ref(), options, learnt, model);

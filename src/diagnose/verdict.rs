@@ -55,9 +55,11 @@ const MAKES_NOISE: [&str; 3] = ["spatial-correlation", "frozen-noise", "disparit
 /// Share of the noise's standard deviation from which on such a change is reported first.
 const LARGE: f64 = 0.3;
 
-/// Downgrades symptoms where a recording is compared with a simulation of the same physics: the size of the
-/// noise follows from its origin, and what the catalogue calls a cause is often a symptom.
-pub(super) fn symptoms(found: &mut [Finding]) {
+/// Downgrades symptoms where a recording is compared with a simulation: the size of the noise follows from its
+/// origin. Where the simulation is `matched` as a sensor is, what the catalogue calls a cause is often a symptom,
+/// too; in a simulation by formulas it is a formula like theirs.
+pub(super) fn symptoms(found: &mut [Finding], matched: bool) {
+    let is_symptom = |id: &str| matched && effects::find(id).is_some_and(|e| e.card().is_symptom);
     let moves = found.iter().any(|f| f.effect == Some("target-motion"));
     let made = moves
         || found
@@ -79,10 +81,6 @@ pub(super) fn symptoms(found: &mut [Finding]) {
             f.share *= 1e-3;
         }
     }
-}
-
-fn is_symptom(id: &str) -> bool {
-    effects::find(id).is_some_and(|e| e.card().is_symptom)
 }
 
 /// A finding of less than this share of the explained mismatch is minor.

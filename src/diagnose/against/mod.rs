@@ -16,10 +16,10 @@ use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::structures::structures;
 use crate::diagnose::noise::tails::{Confusers, tails};
 use crate::diagnose::noise::texture_finding::TextureFinding;
-use crate::diagnose::noise::texture_findings;
+use crate::diagnose::noise::{texture_findings, window};
 use crate::diagnose::options::{DiagnoseOptions, EACH_LEVEL, MIN_VIEWS, measure_options};
 use crate::diagnose::steps::lattice::Quantisation;
-use crate::diagnose::steps::{Steps, lattice};
+use crate::diagnose::steps::{Steps, forget_windows, measure_steps, own_step};
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
@@ -40,6 +40,8 @@ pub struct Baseline {
     /// Variance with a cause of its own: quantisation steps and row noise.
     pub steps: Steps,
     pub(in crate::diagnose) heavy: bool,
+    /// Whether its noise went through a window: a matcher's, or that of a formula which imitates one.
+    pub(in crate::diagnose) has_a_window: bool,
     /// Oddities, in words.
     pub remarks: Vec<String>,
 }
@@ -100,10 +102,11 @@ impl Baseline {
 
     fn measured(
         simulated: &Recording,
-        fields: Vec<Field>,
+        mut fields: Vec<Field>,
         bench: &Workbench<'_>,
         options: &DiagnoseOptions,
     ) -> Self {
+        let lattice = measure_steps(&mut fields, simulated, &bench.rays);
         let none = KnownTerms::default();
         let mut survey = Survey::of(&fields, bench);
         survey.compared();
@@ -113,11 +116,16 @@ impl Baseline {
         survey.compare_frames(&fields, common(&structure, &textures, &none));
         let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };
         measure_tails(&mut structure, &fields, &[], &whitener);
-        let lattice = lattice(&fields, simulated);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
+        // Neighbours within a coarse step are alike without a window.
+        let mut unstepped = structure.clone();
+        if own_step(&lattice, simulated, fields[0].scale_px_m).is_none() {
+            forget_windows(&mut unstepped, &fields, &lattice);
+        }
         let confusers = Confusers { simulated: true, ..Confusers::default() };
         Baseline {
             heavy: tails(&structure, &none, EACH_LEVEL * options.level, confusers).is_some(),
+            has_a_window: window(&unstepped, &none, EACH_LEVEL * options.level).is_some(),
             fields,
             survey,
             structure,

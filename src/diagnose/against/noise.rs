@@ -22,6 +22,8 @@ use crate::terms::{Axis, ROOM_LUX, Statistic};
 
 /// Level for naming a cause: that the noise differs is known by then.
 pub const NAMED_LEVEL: f64 = 0.05;
+/// Level for naming a motion, by the better of two tests: noise that merely stands still less looks like one.
+const MOVING_LEVEL: f64 = 0.01;
 /// A part of the noise below this share cannot be told from the other.
 const MIN_PART: f64 = 0.005;
 
@@ -103,7 +105,8 @@ impl NoiseParts {
     /// Whether constant noise becomes changing noise, as where the target moves under the pattern.
     fn renews(&self, velocity_p: f64) -> bool {
         let falls = mean(&self.views, |v| v.falls).map_or(1.0, |m| m.p_above(0.0));
-        self.down(&self.still) && self.up(&self.changing) && falls.min(velocity_p) < NAMED_LEVEL
+        let renewed = self.down(&self.still) && self.up(&self.changing);
+        renewed && 2.0 * falls.min(velocity_p) < MOVING_LEVEL
     }
 
     fn finding(&self, velocity: Option<(f64, f64, f64)>) -> Option<TextureFinding> {

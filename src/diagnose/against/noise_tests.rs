@@ -57,6 +57,17 @@ fn each_cause_changes_the_parts_in_its_own_way() {
     }
 }
 
+/// Frames as like each other whatever lies between them: the velocity has to tell.
+#[test]
+fn noise_that_stands_still_less_is_a_motion_only_with_a_velocity() {
+    let moves = |p| {
+        let mut rng = Seed(1).stream("against/moving");
+        let found = parts([0.5, 5.5], 0.0, &mut rng)?.finding(Some((0.01, 0.005, p)))?;
+        Some(found.families == ["target-motion"])
+    };
+    assert_eq!((moves(0.003), moves(0.03)), (Some(true), Some(false)));
+}
+
 #[test]
 fn a_larger_window_shrinks_both_parts_alike_and_the_same_sensor_neither() {
     let (mut shrunk, mut said) = (0, 0);

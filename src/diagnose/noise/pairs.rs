@@ -47,10 +47,10 @@ pub struct Lines {
 }
 
 impl Pairs {
-    /// Measures an image of the noise, less any plane in it; NaN where there is no value.
-    pub fn of(image: &[f32], width: usize) -> Option<Self> {
+    /// Measures an image of the noise of words of this step, less any plane in it; NaN where there is no value.
+    pub fn of(image: &[f32], width: usize, step_px: f64) -> Option<Self> {
         let (level, plane) = Plane::taken_from(image, width)?;
-        let level = without_outliers(&level);
+        let level = without_outliers(&level, step_px);
         let height = level.len() / width;
         let pixels = level.iter().filter(|r| r.is_finite()).count() as f64;
         let power = mean(level.iter().map(|r| f64::from(*r).powi(2)))?;
@@ -252,7 +252,7 @@ mod tests {
                     if u < 20 || (u + v) % 31 == 0 { f32::NAN } else { r as f32 }
                 })
                 .collect();
-            Pairs::of(&image, WIDTH).unwrap()
+            Pairs::of(&image, WIDTH, 0.0).unwrap()
         };
         (0..100).map(one).collect()
     }
@@ -283,7 +283,7 @@ mod tests {
             let mut rng = Seed(n).stream("pairs/window");
             let noise = noise_through_boxes(sides, side, &mut rng);
             let image: Vec<f32> = noise.into_iter().map(|r| r as f32).collect();
-            Pairs::of(&image, sides[0]).unwrap()
+            Pairs::of(&image, sides[0], 0.0).unwrap()
         };
         (0..images).map(one).collect()
     }

@@ -4,6 +4,7 @@ mod coarse;
 pub mod comb;
 pub mod lattice;
 
+use crate::camera::Rays;
 use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::parameters::one;
@@ -58,10 +59,25 @@ impl Steps {
     }
 }
 
-pub(in crate::diagnose) fn lattice<'a>(
-    fields: impl IntoIterator<Item = &'a Field>,
+/// Finds the steps of the stored words, and what they are at each target.
+pub(in crate::diagnose) fn measure_steps(
+    fields: &mut [Field],
     recording: &Recording,
+    rays: &Rays,
 ) -> Quantisation {
+    let found = lattice(&*fields, recording);
+    for f in fields.iter_mut().filter(|f| !f.pixels.is_empty()) {
+        let z = f.scale_px_m / f.disparity(f.pixels.len() / 2, rays);
+        let word_px = match recording.sensor.code {
+            DepthCode::Metric { units_per_metre, .. } => f.scale_px_m / (units_per_metre * z * z),
+            DepthCode::Disparity { slope, .. } => (slope * f.scale_px_m).abs(),
+        };
+        f.step_px = found.step_px(f.scale_px_m, z).max(word_px);
+    }
+    found
+}
+
+fn lattice<'a>(fields: impl IntoIterator<Item = &'a Field>, recording: &Recording) -> Quantisation {
     let (mut words, mut pictures) = (RawHistogram::default(), RawHistogram::default());
     let mut scale_px_m = 0.0;
     for f in fields {

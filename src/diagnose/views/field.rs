@@ -64,6 +64,8 @@ pub struct Field {
     pub light: Vec<f32>,
     /// Median infrared amplitude over the target, in the image's own units.
     pub infrared: Option<f64>,
+    /// Step between the stored words at the target's middle, px.
+    pub step_px: f64,
     /// How often each stored word occurs on the target.
     pub words: RawHistogram,
     /// Same over the whole images, counted where the target has few distinct words.
