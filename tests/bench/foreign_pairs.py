@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+"""Independent concealed sets of a Kinect's kind, each held against a simulation of the same sensor.
+
+The causes are those of foreign_sets.py. Here words are raw disparities in steps of an eighth of a pixel, noise
+passes a box of 3 to 9 px, up to half of it is the same in all frames of a view, and a second recording of the
+same poses, without the cause, takes the place of a model. What a matcher's light and blur may bring about too has
+no name there: it "resembles" the cause at best.
+
+    foreign_pairs.py [--kinoise BIN] [--repeat N] [--seed S] [--jobs J] [--keep DIR] [CAUSE ...]
+"""
+import argparse, collections, concurrent.futures, contextlib, json, pathlib, subprocess, sys, tempfile
+
+from foreign_sets import BASELINE, CAUSES, EVERY_S, FOCAL, HEIGHT, UNITS, VIEWS, WIDTH, Sensor, np, verdict
+from scipy.ndimage import uniform_filter
+
+OFFSET, SLOPE, INVALID = 3.3309495161, -0.0030711016, 2047  # ROS wiki, kinect_node: 1/m and 1/m a word
+
+
+class Kinect(Sensor):
+    def __init__(self, rng, frozen, window):
+        super().__init__(rng, False)
+        self.frozen, self.window, self.noise = frozen, window, self.partly_frozen
+
+    def through_window(self, white):
+        return uniform_filter(white, self.window) * self.window
+
+    def partly_frozen(self, v, k):
+        draw = lambda: self.through_window(self.rng.standard_normal((HEIGHT, WIDTH)))
+        if "frozen" not in v["memory"]:
+            v["memory"]["frozen"] = draw()
+        return np.sqrt(self.frozen) * v["memory"]["frozen"] + np.sqrt(1 - self.frozen) * draw()
+
+    def record(self, folder, poses):
+        folder.mkdir(parents=True)
+        code = dict(offset=OFFSET, slope=SLOPE, invalid=INVALID)
+        about = dict(format="recording/1", sensor="Kinect", width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL,
+                     cx=(WIDTH - 1) / 2, cy=(HEIGHT - 1) / 2, baseline_m=BASELINE, raw_disparity=code)
+        (folder / "recording.json").write_text(json.dumps(about))
+        for n, pose in enumerate(poses):
+            self.view(folder / f"{n:03}", *pose, n * EVERY_S)
+
+    def save(self, folder, kind, k, time, image):
+        if kind == "depth":
+            word = np.rint((UNITS / np.maximum(image, 1) - OFFSET) / SLOPE)
+            image = np.where((image > 0) & (word >= 0) & (word < INVALID), word, INVALID)
+        super().save(folder, kind, k, time, image)
+
+
+def judge(args, name, n):
+    rng = np.random.default_rng([args.seed, list(CAUSES).index(name), n])
+    frozen, window = float(rng.choice([0, 0.2, 0.5])), int(rng.choice([3, 5, 9]))
+    distances = np.geomspace(0.9, 3.6, VIEWS) * rng.uniform(0.95, 1.05, VIEWS)
+    tilts = np.radians(np.linspace(0, 60, VIEWS))
+    rng.shuffle(distances), rng.shuffle(tilts)
+    poses = list(zip(distances, tilts, rng.uniform(0, 2 * np.pi, VIEWS)))
+    with contextlib.ExitStack() as stack:
+        kept = args.keep and pathlib.Path(args.keep) / f"{name}.{n}"
+        place = pathlib.Path(kept or stack.enter_context(tempfile.TemporaryDirectory()))
+        real, simulated = Kinect(rng, frozen, window), Kinect(rng, frozen, window)
+        number = CAUSES[name](real, rng)
+        if real.noise != real.partly_frozen:  # Noise of the cause's own passes the window too.
+            own = real.noise
+            real.noise = lambda v, k: real.through_window(own(v, k))
+        simulated.print, simulated.lit, simulated.reference_m = real.print, real.lit, real.reference_m
+        real.record(place / "rec", poses)
+        simulated.record(place / "sim", poses)
+        words = ["diagnose", place / "rec", "--against", place / "sim", "-o", place / "out"]
+        done = subprocess.run([args.kinoise, "--threads", "1", *words], capture_output=True, text=True)
+        if done.returncode not in (0, 1):
+            return name, number, frozen, window, "refused", done.stderr.strip()[-300:]
+        told = json.loads((place / "out/diagnosis.json").read_text())
+    found = [f for f in told["findings"] if f["status"] != "not-identifiable"]
+    words = [f"{f['effect'] or f['status'] + ' ' + f['statistic'] + ' over ' + f['axis']} {f['share']:.3f}" for f in found]
+    how = verdict(name, told)
+    resembles = found and found[0]["effect"] is None and [a["effect"] for a in found[0]["alternatives"][:1]] == [name]
+    return name, number, frozen, window, "resembles" if resembles else how, "; ".join(words)
+
+
+def main():
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    p.add_argument("causes", nargs="*", metavar="CAUSE", help="all without any")
+    p.add_argument("--kinoise", default="target/release/kinoise")
+    p.add_argument("--repeat", type=int, default=1, help="sets of each cause")
+    p.add_argument("--seed", type=int, default=0)
+    p.add_argument("--jobs", type=int, default=1)
+    p.add_argument("--keep", metavar="DIR", help="keep every set in this folder")
+    args = p.parse_args()
+    if unknown := [c for c in args.causes if c not in CAUSES]:
+        sys.exit(f"no such cause: {', '.join(unknown)}; there are {', '.join(CAUSES)}")
+    count = collections.Counter()
+    with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
+        jobs = [pool.submit(judge, args, c, n) for n in range(args.repeat) for c in args.causes or CAUSES]
+        for job in jobs:
+            name, number, frozen, window, how, words = job.result()
+            kind = "clean" if name == "clean" else "outside" if name.startswith("out-") else "single"
+            count[f"{kind} {how}"] += 1
+            print(f"{how:11} {name} {number:.3g} (frozen {frozen}, window {window}): {words}", flush=True)
+    print(", ".join(f"{n} {what}" for what, n in sorted(count.items())))
+
+
+if __name__ == "__main__":
+    main()
