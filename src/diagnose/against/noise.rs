@@ -24,6 +24,9 @@ use crate::terms::{Axis, ROOM_LUX, Statistic};
 pub const NAMED_LEVEL: f64 = 0.05;
 /// Level for naming a motion, by the better of two tests: noise that merely stands still less looks like one.
 const MOVING_LEVEL: f64 = 0.01;
+/// Largest share of the changing noise that steps are taken for: where the noise changes by less than a third of
+/// a step, their error stands still, too (Widrow and Kollar, Quantization Noise, 2008).
+const MAX_OF_STEPS: f64 = 0.5;
 /// A part of the noise below this share cannot be told from the other.
 const MIN_PART: f64 = 0.005;
 
@@ -32,6 +35,8 @@ struct View {
     /// Log ratios of the variance to the simulated one.
     still: f64,
     changing: f64,
+    /// By how much more the constant part has grown than the changing one, of which the words' steps do not grow.
+    apart: f64,
     /// Relative difference from the simulated variance.
     total: f64,
     /// Additional fall of the correlation of two frames with the time between them.
@@ -52,9 +57,12 @@ impl View {
         };
         let fall = |s: &Structure| Some(s.lagged[0]? - later(s)?);
         let (ours, theirs) = (parts(real)?, parts(twin)?);
+        let [still, changing] = [0, 1].map(|k| ours[k] / theirs[k]);
+        let of_steps = (twin.step_px.powi(2) / 12.0 / theirs[1]).min(MAX_OF_STEPS);
         Some(View {
-            still: (ours[0] / theirs[0]).ln(),
-            changing: (ours[1] / theirs[1]).ln(),
+            still: still.ln(),
+            changing: changing.ln(),
+            apart: ((still + of_steps * (1.0 - still)) / changing).ln(),
             total: real.variance_px2 / twin.variance_px2 - 1.0,
             falls: fall(real).zip(fall(twin)).map_or(f64::NAN, |(r, t)| r - t),
             share: ours[0] / real.variance_px2,
@@ -79,7 +87,7 @@ impl NoiseParts {
         let views: Vec<View> = real.iter().zip(twins).filter_map(|(r, t)| View::of(r, t)).collect();
         let mean = |of: fn(&View) -> f64| mean(&views, of);
         let (still, changing) = (mean(|v| v.still)?, mean(|v| v.changing)?);
-        let apart = mean(|v| v.still - v.changing)?;
+        let apart = mean(|v| v.apart)?;
         Some(NoiseParts { still, changing, apart, views, level })
     }
 

@@ -23,6 +23,8 @@ pub struct Structure {
     pub pixels: f64,
     /// Variance of the first frame's high-passed residual, px^2.
     pub variance_px2: f64,
+    /// Step between the stored words, px.
+    pub step_px: f64,
     /// Side of the window that would cause the correlation, px.
     pub window_px: Option<f64>,
     /// Correlation of the changes between frames at lags of 1, 2, 3, ... px, beyond that at far lags.
@@ -143,6 +145,7 @@ impl Structure {
 pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let (mut s, mut short) = (Structure::default(), Lines::default());
     let step_px = field.step_px;
+    s.step_px = step_px;
     let frames =
         field.first.iter().map(|r| without_outliers(&high_passed(field, r, bias), step_px));
     let frames: Vec<Vec<f32>> = frames.collect();
