@@ -19,16 +19,18 @@ OFFSET, SLOPE, INVALID = 3.3309495161, -0.0030711016, 2047  # ROS wiki, kinect_n
 class Kinect(Sensor):
     def __init__(self, rng, frozen, window):
         super().__init__(rng, False)
-        self.frozen, self.window, self.noise = frozen, window, self.partly_frozen
+        self.frozen, self.window, self.noise, self.changing = frozen, window, self.partly_frozen, None
 
-    def through_window(self, white):
-        return uniform_filter(white, self.window) * self.window
+    def through_window(self, e):
+        passed = uniform_filter(e, self.window)
+        return passed * e.std() / passed.std()
 
     def partly_frozen(self, v, k):
         draw = lambda: self.through_window(self.rng.standard_normal((HEIGHT, WIDTH)))
         if "frozen" not in v["memory"]:
             v["memory"]["frozen"] = draw()
-        return np.sqrt(self.frozen) * v["memory"]["frozen"] + np.sqrt(1 - self.frozen) * draw()
+        own = self.through_window(self.changing(v, k)) if self.changing else draw()
+        return np.sqrt(self.frozen) * v["memory"]["frozen"] + np.sqrt(1 - self.frozen) * own
 
     def record(self, folder, poses):
         folder.mkdir(parents=True)
@@ -58,9 +60,8 @@ def judge(args, name, n):
         place = pathlib.Path(kept or stack.enter_context(tempfile.TemporaryDirectory()))
         real, simulated = Kinect(rng, frozen, window), Kinect(rng, frozen, window)
         number = CAUSES[name](real, rng)
-        if real.noise != real.partly_frozen:  # Noise of the cause's own passes the window too.
-            own = real.noise
-            real.noise = lambda v, k: real.through_window(own(v, k))
+        if real.noise != real.partly_frozen:  # Noise of the cause's own joins the frozen part.
+            real.changing, real.noise = real.noise, real.partly_frozen
         simulated.print, simulated.lit, simulated.reference_m = real.print, real.lit, real.reference_m
         real.record(place / "rec", poses)
         simulated.record(place / "sim", poses)

@@ -24,8 +24,8 @@ use crate::terms::{Axis, ROOM_LUX, Statistic};
 pub const NAMED_LEVEL: f64 = 0.05;
 /// Level for naming a motion, by the better of two tests: noise that merely stands still less looks like one.
 const MOVING_LEVEL: f64 = 0.01;
-/// Largest share of the changing noise that steps are taken for: where the noise changes by less than a third of
-/// a step, their error stands still, too (Widrow and Kollar, Quantization Noise, 2008).
+/// Largest share of the changing noise that steps are taken for. Where the noise that changes is less than 0.29
+/// of a step, part of their error stands still, too.
 const MAX_OF_STEPS: f64 = 0.5;
 /// A part of the noise below this share cannot be told from the other.
 const MIN_PART: f64 = 0.005;
@@ -58,11 +58,11 @@ impl View {
         let fall = |s: &Structure| Some(s.lagged[0]? - later(s)?);
         let (ours, theirs) = (parts(real)?, parts(twin)?);
         let [still, changing] = [0, 1].map(|k| ours[k] / theirs[k]);
-        let of_steps = (twin.step_px.powi(2) / 12.0 / theirs[1]).min(MAX_OF_STEPS);
+        let of_steps = |s: &Structure| (s.step_px.powi(2) / 12.0 / theirs[1]).min(MAX_OF_STEPS);
         Some(View {
             still: still.ln(),
             changing: changing.ln(),
-            apart: ((still + of_steps * (1.0 - still)) / changing).ln(),
+            apart: ((still * (1.0 - of_steps(twin)) + of_steps(real)) / changing).ln(),
             total: real.variance_px2 / twin.variance_px2 - 1.0,
             falls: fall(real).zip(fall(twin)).map_or(f64::NAN, |(r, t)| r - t),
             share: ours[0] / real.variance_px2,
@@ -76,7 +76,7 @@ pub struct NoiseParts {
     views: Vec<View>,
     still: ViewMean,
     changing: ViewMean,
-    /// Constant part less changing part.
+    /// Mean of the views' `apart`.
     apart: ViewMean,
     level: f64,
 }

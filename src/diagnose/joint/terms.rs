@@ -89,7 +89,7 @@ impl Joint<'_> {
                 self.drop_idle(&mut settled, chosen, total(&alone));
                 settled.maps = total(&settled.scores) - total(&alone);
                 let freedom = alone.len().saturating_sub(1).max(1) as f64;
-                settled.maps_p = student_upper(in_each_fold(&settled.scores, &alone), freedom);
+                settled.maps_p = student_upper(behind(&settled.scores, &alone), freedom);
             }
         }
         if settled.penalty.is_none() {
