@@ -56,7 +56,7 @@ impl Growing {
         if read.is_err() {
             // Another machine's clock may be ahead.
             let since = self.unread_since.get_or_insert_with(Instant::now);
-            if modified.elapsed().map_or(since.elapsed(), |age| age) < MAX_WRITING {
+            if modified.elapsed().unwrap_or_else(|_| since.elapsed()) < MAX_WRITING {
                 return None;
             }
         }

@@ -19,7 +19,7 @@ use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::{texture_findings, window};
 use crate::diagnose::options::{DiagnoseOptions, EACH_LEVEL, MIN_VIEWS, measure_options};
 use crate::diagnose::steps::lattice::Quantisation;
-use crate::diagnose::steps::{Steps, forget_windows, measure_steps, own_step};
+use crate::diagnose::steps::{Steps, forget_windows, measure_steps};
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
@@ -117,11 +117,8 @@ impl Baseline {
         let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };
         measure_tails(&mut structure, &fields, &[], &whitener);
         let steps = Steps::of(&lattice, &structure, &fields, simulated);
-        // Neighbours within a coarse step are alike without a window.
         let mut unstepped = structure.clone();
-        if own_step(&lattice, simulated, fields[0].scale_px_m).is_none() {
-            forget_windows(&mut unstepped, &fields, &lattice);
-        }
+        forget_windows(&mut unstepped, &fields, &lattice, simulated);
         let confusers = Confusers { simulated: true, ..Confusers::default() };
         Baseline {
             heavy: tails(&structure, &none, EACH_LEVEL * options.level, confusers).is_some(),

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::fit::{Joint, Reduced, SMOOTHNESS};
 use crate::diagnose::search::candidate::Candidate;
-use crate::diagnose::search::choose::behind;
+use crate::diagnose::search::choose::{behind, over_error};
 use crate::diagnose::search::outcome::Chosen;
 use crate::diagnose::views::samples::COARSE_PX;
 use crate::stats::student_upper;
@@ -260,8 +260,7 @@ fn in_each_fold(winner: &[f64], rival: &[f64]) -> f64 {
     let size = |(w, r): (&f64, &f64)| w.abs() + r.abs();
     let least = LEAST_FOLD * pairs().map(size).sum::<f64>() / winner.len().max(1) as f64;
     let share = |(w, r): (&f64, &f64)| (w - r) / (size((w, r)) + least).max(f64::MIN_POSITIVE);
-    let shares: Vec<f64> = pairs().map(share).collect();
-    behind(&shares, &vec![0.0; shares.len()])
+    over_error(&pairs().map(share).collect::<Vec<f64>>())
 }
 
 /// Whether the maps can express the same, and more.

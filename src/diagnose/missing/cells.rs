@@ -115,8 +115,10 @@ pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) 
         mine.retain(|c| theirs.contains_key(&key(c, rim)));
         let (expected, loses): (Vec<f64>, Vec<bool>) = mine
             .iter()
-            .map(|c| (c, theirs[&key(c, rim)]))
-            .map(|(c, (expected, loses))| (expected, loses || c.lost > 0.0))
+            .map(|c| {
+                let (expected, loses) = theirs[&key(c, rim)];
+                (expected, loses || c.lost > 0.0)
+            })
             .unzip();
         // A clump seen in one run could have lain next to it in the other.
         let differs: Vec<bool> = (0..mine.len())

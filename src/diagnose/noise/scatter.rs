@@ -15,7 +15,7 @@ use crate::diagnose::finding::pixels::{
 };
 use crate::diagnose::options::EACH_LEVEL;
 use crate::diagnose::search::outcome::Outcome;
-use crate::diagnose::steps::{Steps, forget_windows, own_step};
+use crate::diagnose::steps::{Steps, forget_windows};
 use crate::diagnose::views::known::ray_share;
 use crate::terms::{Axis, Basis, PixelContext, Statistic, Term};
 
@@ -36,9 +36,7 @@ impl Case<'_> {
         let mut structure = structures(&self.fields, &mean.px, &self.kept);
         let lattice = self.lattice;
         let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
-        if own_step(&lattice, self.recording, self.fields[0].scale_px_m).is_none() {
-            forget_windows(&mut structure, &self.fields, &lattice);
-        }
+        forget_windows(&mut structure, &self.fields, &lattice, self.recording);
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(EACH_LEVEL);

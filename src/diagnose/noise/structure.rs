@@ -8,8 +8,8 @@ use super::pairs::{Lines, NEIGHBOURS, Pairs};
 use super::still::Still;
 use super::tail_counts::{MIN_READINGS, TailCounts};
 use super::texture::{
-    FAR, Filled, PROFILE_LAGS, SHORT_LINE, area, changes, covariance, frame_log_variance,
-    high_passed, moving, same_pixel, without_lines, without_outliers,
+    FAR, Filled, PROFILE_LAGS, SHORT_LINE, area, changes, covariance, fine_scale,
+    frame_log_variance, moving, same_pixel, without_lines,
 };
 use crate::diagnose::options::FRAMES_KEPT;
 use crate::diagnose::views::box_sums::repeats_of_box;
@@ -144,11 +144,8 @@ impl Structure {
 /// A view's structure, and what its lines share by pairs in short blocks.
 pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let (mut s, mut short) = (Structure::default(), Lines::default());
-    let step_px = field.step_px;
-    s.step_px = step_px;
-    let frames =
-        field.first.iter().map(|r| without_outliers(&high_passed(field, r, bias), step_px));
-    let frames: Vec<Vec<f32>> = frames.collect();
+    s.step_px = field.step_px;
+    let frames: Vec<Vec<f32>> = field.first.iter().map(|r| fine_scale(field, r, bias)).collect();
     let Some(first) = frames.first() else { return (s, short) };
     s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
@@ -161,7 +158,7 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     (s.frame_log_variance, s.frame_pixels) = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();
     let pairs: Option<Vec<Pairs>> =
-        changes(&images).iter().map(|change| Pairs::of(change, field.width, step_px)).collect();
+        changes(&images).iter().map(|change| Pairs::of(change, field.width, s.step_px)).collect();
     if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
         let all = |of: &dyn Fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
         let [long, by_short] = [0, 1].map(|k| Lines {

@@ -67,7 +67,8 @@ pub fn at_two_scales(field: &Field, residuals: &[f32], bias: &[f32]) -> [Vec<f32
     [pixels, means]
 }
 
-fn fine_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
+/// Residuals as an image, px, without the known bias, gross errors and what is smooth.
+pub fn fine_scale(field: &Field, residuals: &[f32], bias: &[f32]) -> Vec<f32> {
     without_outliers(&high_passed(field, residuals, bias), field.step_px)
 }
 

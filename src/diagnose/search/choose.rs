@@ -241,16 +241,19 @@ const CLEAR: f64 = 0.85;
 fn consistent_across_views(judged: &Judged) -> bool {
     const WILD: f64 = 3.0;
     const STEADY: f64 = 2.5;
-    let none = vec![0.0; judged.gain.by_view.len()];
-    judged.null.dispersion < WILD || behind(&judged.gain.by_view, &none) > STEADY
+    judged.null.dispersion < WILD || over_error(&judged.gain.by_view) > STEADY
 }
 
 /// Mean difference over the views, divided by its standard error.
 pub fn behind(winner: &[f64], rival: &[f64]) -> f64 {
-    let n = winner.len() as f64;
-    let differences = || winner.iter().zip(rival).map(|(w, r)| w - r);
-    let mean = differences().sum::<f64>() / n;
-    let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    over_error(&winner.iter().zip(rival).map(|(w, r)| w - r).collect::<Vec<f64>>())
+}
+
+/// Mean, divided by its standard error; zero where the values do not scatter.
+pub fn over_error(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     if variance > 0.0 { mean / (variance / n).sqrt() } else { 0.0 }
 }
 

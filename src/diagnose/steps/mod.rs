@@ -68,10 +68,7 @@ pub(in crate::diagnose) fn measure_steps(
     let found = lattice(&*fields, recording);
     for f in fields.iter_mut().filter(|f| !f.pixels.is_empty()) {
         let z = f.scale_px_m / f.disparity(f.pixels.len() / 2, rays);
-        let word_px = match recording.sensor.code {
-            DepthCode::Metric { units_per_metre, .. } => f.scale_px_m / (units_per_metre * z * z),
-            DepthCode::Disparity { slope, .. } => (slope * f.scale_px_m).abs(),
-        };
+        let word_px = f.scale_px_m * recording.sensor.code.step_inverse(z);
         f.step_px = found.step_px(f.scale_px_m, z).max(word_px);
     }
     found
@@ -120,13 +117,18 @@ pub(in crate::diagnose) fn own_step_note(step: f64) -> String {
 /// 2008). The error of coarser steps follows the surface.
 pub(in crate::diagnose) const COARSE_SIGMAS: f64 = 2.0;
 
-/// Drops windows and line variances of views with coarse steps. Neighbours in one step err together, and
-/// whether a pixel jumps between frames depends on where in a step its line lies.
+/// Drops windows and line variances of views with coarse steps other than those of the recording's own words.
+/// Neighbours in one step err together, and whether a pixel jumps between frames depends on where in a step its
+/// line lies.
 pub(in crate::diagnose) fn forget_windows(
     structure: &mut [Structure],
     fields: &[Field],
     lattice: &Quantisation,
+    recording: &Recording,
 ) {
+    if own_step(lattice, recording, fields[0].scale_px_m).is_some() {
+        return;
+    }
     for (s, f) in structure.iter_mut().zip(fields) {
         let sigma = f.middle_sigma_px().map_or(0.0, f64::from);
         let step = lattice.step_px(f.scale_px_m, f.plane.depth(0.0, 0.0));
