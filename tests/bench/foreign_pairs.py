@@ -8,9 +8,10 @@ no name there: it "resembles" the cause at best.
 
     foreign_pairs.py [--kinoise BIN] [--repeat N] [--seed S] [--jobs J] [--keep DIR] [CAUSE ...]
 """
-import argparse, collections, concurrent.futures, contextlib, json, pathlib, subprocess, sys, tempfile
+import contextlib, json, pathlib, subprocess, tempfile
 
-from foreign_sets import BASELINE, CAUSES, EVERY_S, FOCAL, HEIGHT, UNITS, VIEWS, WIDTH, Sensor, np, verdict
+from foreign_sets import BASELINE, CAUSES, EVERY_S, FOCAL, HEIGHT, UNITS, VIEWS, WIDTH, Sensor
+from foreign_sets import arguments, described, np, report, verdict
 from scipy.ndimage import uniform_filter
 
 OFFSET, SLOPE, INVALID = 3.3309495161, -0.0030711016, 2047  # ROS wiki, kinect_node: 1/m and 1/m a word
@@ -59,7 +60,7 @@ def judge(args, name, n):
         kept = args.keep and pathlib.Path(args.keep) / f"{name}.{n}"
         place = pathlib.Path(kept or stack.enter_context(tempfile.TemporaryDirectory()))
         real, simulated = Kinect(rng, frozen, window), Kinect(rng, frozen, window)
-        number = CAUSES[name](real, rng)
+        about = f"{CAUSES[name](real, rng):.3g} (frozen {frozen}, window {window})"
         if real.noise != real.partly_frozen:  # Noise of the cause's own joins the frozen part.
             real.changing, real.noise = real.noise, real.partly_frozen
         simulated.print, simulated.lit, simulated.reference_m = real.print, real.lit, real.reference_m
@@ -68,36 +69,12 @@ def judge(args, name, n):
         words = ["diagnose", place / "rec", "--against", place / "sim", "-o", place / "out"]
         done = subprocess.run([args.kinoise, "--threads", "1", *words], capture_output=True, text=True)
         if done.returncode not in (0, 1):
-            return name, number, frozen, window, "refused", done.stderr.strip()[-300:]
+            return "refused", about, done.stderr.strip()[-300:]
         told = json.loads((place / "out/diagnosis.json").read_text())
     found = [f for f in told["findings"] if f["status"] != "not-identifiable"]
-    words = [f"{f['effect'] or f['status'] + ' ' + f['statistic'] + ' over ' + f['axis']} {f['share']:.3f}" for f in found]
-    how = verdict(name, told)
     resembles = found and found[0]["effect"] is None and [a["effect"] for a in found[0]["alternatives"][:1]] == [name]
-    return name, number, frozen, window, "resembles" if resembles else how, "; ".join(words)
-
-
-def main():
-    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    p.add_argument("causes", nargs="*", metavar="CAUSE", help="all without any")
-    p.add_argument("--kinoise", default="target/release/kinoise")
-    p.add_argument("--repeat", type=int, default=1, help="sets of each cause")
-    p.add_argument("--seed", type=int, default=0)
-    p.add_argument("--jobs", type=int, default=1)
-    p.add_argument("--keep", metavar="DIR", help="keep every set in this folder")
-    args = p.parse_args()
-    if unknown := [c for c in args.causes if c not in CAUSES]:
-        sys.exit(f"no such cause: {', '.join(unknown)}; there are {', '.join(CAUSES)}")
-    count = collections.Counter()
-    with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
-        jobs = [pool.submit(judge, args, c, n) for n in range(args.repeat) for c in args.causes or CAUSES]
-        for job in jobs:
-            name, number, frozen, window, how, words = job.result()
-            kind = "clean" if name == "clean" else "outside" if name.startswith("out-") else "single"
-            count[f"{kind} {how}"] += 1
-            print(f"{how:11} {name} {number:.3g} (frozen {frozen}, window {window}): {words}", flush=True)
-    print(", ".join(f"{n} {what}" for what, n in sorted(count.items())))
+    return "resembles" if resembles else verdict(name, told), about, described(told)
 
 
 if __name__ == "__main__":
-    main()
+    report(arguments(__doc__).parse_args(), judge)

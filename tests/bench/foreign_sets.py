@@ -281,6 +281,12 @@ def verdict(name, told):
     return "first" if found[:1] == [name] else "found" if name in found else "wrong" if found else "missed"
 
 
+def described(told):
+    """The findings, each with its share."""
+    return "; ".join(f"{f['effect'] or f['status'] + ' ' + f['statistic'] + ' over ' + f['axis']} {f['share']:.3f}"
+                     for f in told["findings"] if f["status"] != "not-identifiable")
+
+
 def judge(args, name, n):
     known = [list(CAUSES).index(c) for c in name.split("+")]
     rng = np.random.default_rng([args.seed, *known, n])
@@ -292,6 +298,7 @@ def judge(args, name, n):
         run = lambda *words: subprocess.run([args.kinoise, "--threads", "1", *words], capture_output=True, text=True)
         sensor = Sensor(rng, across)
         numbers = "+".join(f"{CAUSES[c](sensor, rng):.3g}" for c in name.split("+"))
+        about = f"{numbers} ({'calibrated here' if here else 'model'}{', across the plane' if across else ''})"
         sensor.record(place / "rec")
         model = []
         if not here:
@@ -300,37 +307,44 @@ def judge(args, name, n):
             model = ["-m", place / "calibrated/model.json"]
         done = run("diagnose", place / "rec", *model, "-o", place / "out")
         if done.returncode not in (0, 1):
-            return name, numbers, here, across, "refused", done.stderr.strip()[-300:]
+            return "refused", about, done.stderr.strip()[-300:]
         told = json.loads((place / "out/diagnosis.json").read_text())
-    words = [f"{f['effect'] or f['status'] + ' ' + f['statistic'] + ' over ' + f['axis']} {f['share']:.3f}"
-             for f in told["findings"] if f["status"] != "not-identifiable"]
-    return name, numbers, here, across, verdict(name, told), "; ".join(words)
+    return verdict(name, told), about, described(told)
 
 
-def main():
-    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+def arguments(doc):
+    p = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawTextHelpFormatter)
     p.add_argument("causes", nargs="*", metavar="CAUSE", help="all without any")
     p.add_argument("--kinoise", default="target/release/kinoise")
     p.add_argument("--repeat", type=int, default=1, help="sets of each cause")
-    p.add_argument("--pairs", type=int, help="so many sets of two causes, instead")
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--jobs", type=int, default=1)
     p.add_argument("--keep", metavar="DIR", help="keep every set in this folder")
-    args = p.parse_args()
+    return p
+
+
+def report(args, judge, causes=()):
+    """Judges sets of the causes, prints a line each and the counts."""
     unknown = [c for name in args.causes for c in name.split("+") if c not in CAUSES]
     if unknown:
         sys.exit(f"no such cause: {', '.join(unknown)}; there are {', '.join(CAUSES)}")
-    causes = pairs(args.seed, args.pairs) if args.pairs else args.causes or list(CAUSES)
+    causes = causes or args.causes or list(CAUSES)
     count = collections.Counter()
     with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
-        jobs = [pool.submit(judge, args, c, n) for n in range(args.repeat) for c in causes]
-        for job in jobs:
-            name, numbers, here, across, how, words = job.result()
+        jobs = [(c, pool.submit(judge, args, c, n)) for n in range(args.repeat) for c in causes]
+        for name, job in jobs:
+            how, about, words = job.result()
             kind = "clean" if name == "clean" else "outside" if name.startswith("out-") else "pair" if "+" in name else "single"
             count[f"{kind} {how}"] += 1
-            model = ("calibrated here" if here else "model") + (", across the plane" if across else "")
-            print(f"{how:11} {name} {numbers} ({model}): {words}", flush=True)
+            print(f"{how:11} {name} {about}: {words}", flush=True)
     print(", ".join(f"{n} {what}" for what, n in sorted(count.items())))
+
+
+def main():
+    p = arguments(__doc__)
+    p.add_argument("--pairs", type=int, help="so many sets of two causes, instead")
+    args = p.parse_args()
+    report(args, judge, pairs(args.seed, args.pairs or 0))
 
 
 if __name__ == "__main__":
