@@ -177,6 +177,8 @@ pub struct Recording {
     pub excluded: Vec<Excluded>,
     /// Oddities found while opening.
     pub remarks: Vec<String>,
+    /// Whether its frames are captures, each a view of its own, and no film.
+    pub captures: bool,
     /// Files that describe the recording (not the frames), for provenance.
     pub described_by: Vec<PathBuf>,
 }

@@ -35,6 +35,7 @@ impl Growing {
             let remedy = "start the program that fills it first, or make it";
             return Err(Error::recording(root, "there is no such folder", remedy));
         }
+        assumed.refuse_topic(root)?;
         let first = first_image(root, patience)?;
         let (sensor, remarks) = describe_folder(root, &[FrameRef::file(0.0, first)], assumed)?;
         let seen = BTreeSet::new();

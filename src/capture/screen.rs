@@ -64,7 +64,8 @@ pub fn render(guide: &Guide, status: &Status, columns: usize, rows: usize) -> Ve
     lines.truncate(rows.saturating_sub(1));
     lines.push(plain(KEYS.into()));
     for line in &mut lines {
-        line.text = line.text.chars().take(columns).collect();
+        // Strings of a file may hold sequences that steer the terminal.
+        line.text = line.text.chars().filter(|c| !c.is_control()).take(columns).collect();
         if status.flash.is_some() {
             line.style = Style::Flash;
         }

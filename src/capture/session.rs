@@ -56,7 +56,6 @@ impl Session {
             refuse_another(&description, sensor)?;
             session.recover()?;
         } else {
-            session.recover()?;
             refuse_full(root)?;
             write_recording_file(root, sensor)?;
         }

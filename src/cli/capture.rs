@@ -197,6 +197,7 @@ fn source(arguments: &Arguments, paced: bool) -> anyhow::Result<Box<dyn Source>>
     }
     Ok(match &arguments.source {
         SourceKind::Freenect => {
+            arguments.input.refuse_for_kinect()?;
             let options = FreenectOptions {
                 library: arguments.library.clone(),
                 serial: arguments.serial.clone(),

@@ -111,6 +111,21 @@ impl Input {
         })
     }
 
+    /// Fails if an option is given that has no meaning for a live Kinect, which sends its own raw disparities.
+    pub fn refuse_for_kinect(&self) -> anyhow::Result<()> {
+        let given = [
+            (self.units_per_metre.is_some(), "--units-per-metre"),
+            (self.sensor.is_some(), "--sensor"),
+            (self.topic.is_some(), "--topic"),
+        ];
+        if let Some((_, name)) = given.iter().find(|(given, _)| *given) {
+            bail!(
+                "{name} does not belong to --source freenect: a Kinect sends raw disparities; --raw-disparity says what they mean"
+            );
+        }
+        Ok(())
+    }
+
     /// The same options as arguments, for another command on the same folder.
     pub fn again(&self) -> Vec<OsString> {
         let joined = |all: &[f64]| all.iter().map(|v| shortest(*v)).collect::<Vec<_>>().join(",");

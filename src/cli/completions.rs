@@ -1,8 +1,10 @@
 use anyhow::Context;
 use clap::Args;
 use clap_complete::Shell;
+use serde_json::json;
 
 use super::command;
+use super::common::Global;
 use super::console::answer;
 
 #[derive(Debug, Args)]
@@ -18,8 +20,11 @@ pub struct Arguments {
     shell: Shell,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command(), "kinoise", &mut script);
+    if global.json {
+        return global.print_json(&json!({ "script": String::from_utf8_lossy(&script) }));
+    }
     answer(&script).context("stdout")
 }

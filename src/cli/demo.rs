@@ -24,7 +24,7 @@ use super::console::{next_step, result, result_lines, say, say_lines, shell, wor
 use super::demo_seal::Sealed;
 use super::diagnose::{HeldAgainst, examine};
 use super::map::follow;
-use super::output::{DEMO, DIAGNOSIS, MAP, begin};
+use super::output::{DEMO, DIAGNOSIS, MAP, SEAL, begin};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -43,7 +43,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let output = &arguments.output;
     let seed = Seed(global.seed.unwrap_or_else(clock));
     say("1. Calibrate: how noisy is the sensor of the bundled recording?\n");
-    let (recording, measured, calibration) = calibrated(seed, output, global)?;
+    let sealed = Sealed::draw(seed)?;
+    let (recording, measured, calibration) = calibrated(seed, &sealed, output, global)?;
     let model = &calibration.model;
     say(
         "The recording was simulated with the paper's Eq. 1, so the first two columns should agree.",
@@ -51,9 +52,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     say(format!("Open {} to see it all.", output.join("report.html").display()));
 
     say("\n2. Diagnose: the same sensor once more, with one more cause that nobody has chosen.\n");
-    let sealed = Sealed::draw(seed)?;
     let film = output.join("sealed");
-    sealed.commit(output)?;
     say_lines(sealed.promise());
     filmed(&sealed, &recording.sensor, &model.sigma, &film, seed)?;
     let (diagnosis, page) = diagnosed(&film, model, output, seed, global)?;
@@ -82,14 +81,17 @@ fn clock() -> u64 {
     now.map_or(1, |t| t.as_millis() as u64)
 }
 
+/// Calibrates; the hash of the sealed text lies beside the results before anything is filmed.
 fn calibrated(
     seed: Seed,
+    sealed: &Sealed,
     output: &Path,
     global: &Global,
 ) -> anyhow::Result<(Recording, Measurements, kinoise::Calibration)> {
     let path = bundled()?;
     let recording = open(&path, &Assumed::default())?;
     let out = begin(output, DEMO, &[&path], global)?;
+    out.write(SEAL, sealed.promised().as_bytes())?;
     let options = CalibrateOptions {
         measure: MeasureOptions { seed, ..MeasureOptions::default() },
         form: Some(Form::Paper),

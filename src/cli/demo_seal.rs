@@ -1,11 +1,9 @@
 //! The draw of the demo: a cause and its strength, sealed before the diagnosis, opened after it.
 
-use std::path::Path;
-
 use kinoise::Seed;
 use kinoise::diagnose::{Diagnosis, Finding, Status, Verdict};
 use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
-use kinoise::io::{hex, sha256_hex, write_atomic};
+use kinoise::io::{hex, sha256_hex};
 use kinoise::units::{counted, shortest, to_digits};
 use rand::Rng;
 use serde_json::{Value, json};
@@ -55,11 +53,9 @@ impl Sealed {
         )
     }
 
-    /// Writes the hash into `output` before anything is filmed.
-    pub fn commit(&self, output: &Path) -> kinoise::Result<()> {
-        let promise = output.join("sealed.sha256");
-        // In the format of `sha256sum --check`.
-        write_atomic(&promise, format!("{}  sealed.txt\n", self.hash()).as_bytes())
+    /// Contents of [`super::output::SEAL`], in the format of `sha256sum --check`.
+    pub fn promised(&self) -> String {
+        format!("{}  sealed.txt\n", self.hash())
     }
 
     /// Compares the sealed text with the diagnosis, as text and as JSON.

@@ -1,10 +1,11 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use clap::{Args, ValueEnum};
 use kinoise::evaluate::{Delta, Evaluation, Spread, clock_offset, evaluate};
-use kinoise::io::{OutputFolder, pretty_json};
+use kinoise::io::{Assumed, OutputFolder, pretty_json};
 use kinoise::report::{Against, Origin, evaluation_page};
+use kinoise::sequence::open;
 use kinoise::trajectory::{Pose, read_benchmark};
 use kinoise::units::{counted, shortest};
 use serde_json::{Value, json};
@@ -105,10 +106,9 @@ impl Arguments {
 
 pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let delta = arguments.delta()?;
-    let truth_file = file_in(&arguments.truth, "groundtruth.txt");
     let estimate_file = file_in(&arguments.estimate, "trajectory.txt");
-    let [truth, mut estimate] = [read_benchmark(&truth_file)?, read_benchmark(&estimate_file)?];
-    let inputs = [&*truth_file, &*estimate_file];
+    let [truth, mut estimate] = [truth_in(&arguments.truth)?, read_benchmark(&estimate_file)?];
+    let inputs = [&*arguments.truth, &*estimate_file];
     let new = |place: &PathBuf| begin(place, EVALUATION, &inputs, global);
     let output = arguments.output.as_ref().map(new).transpose()?;
     let shift = arguments.shift(&truth, &estimate)?;
@@ -125,6 +125,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         write(&against, output, &origin)?;
     }
     global.print_json(&as_json(&evaluation))
+}
+
+/// True poses of a file, or of a sequence's folder: 7-Scenes has one file per pose.
+fn truth_in(path: &Path) -> anyhow::Result<Vec<Pose>> {
+    let file = file_in(path, "groundtruth.txt");
+    if !path.is_dir() || file.is_file() {
+        return Ok(read_benchmark(&file)?);
+    }
+    let truth = open(path, &Assumed::default())?.truth;
+    ensure!(
+        !truth.is_empty(),
+        "{}: no true poses in this folder; give a file of them",
+        path.display()
+    );
+    Ok(truth)
 }
 
 /// If `path` is a folder, the file `name` in it.

@@ -129,7 +129,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let options = arguments.tuning.options(global.seed());
     notes(&sequence.remarks);
     let model = arguments.model.read_for(&sequence)?;
-    let title = format!("Map of {}", name_of(&arguments.sequence));
+    let title = format!("Map of {}", sequence.name());
     let inputs: Vec<&Path> =
         arguments.model.path().into_iter().chain([&*arguments.sequence]).collect();
     let out = begin(&arguments.output, MAP, &inputs, global)?;
@@ -244,11 +244,6 @@ fn stats(
         "settings": format!("{options:?}"),
         "truth": against.as_ref().and_then(|t| t.as_ref().ok()).map(super::evaluate::as_json),
     })
-}
-
-fn name_of(path: &Path) -> String {
-    let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-    whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Peak resident memory of this process, MB; known on Linux only.

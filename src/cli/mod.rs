@@ -175,7 +175,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
         Command::Demo(a) => demo::run(a, global).map(|()| 0),
         Command::Export(a) => export::run(a, global).map(|()| 0),
         Command::Schema(a) => schema::run(a).map(|()| 0),
-        Command::Completions(a) => completions::run(a).map(|()| 0),
+        Command::Completions(a) => completions::run(a, global).map(|()| 0),
         Command::Man(a) => man::run(a, global).map(|()| 0),
     }
 }

@@ -59,13 +59,16 @@ pub const SIGMA: Leaves = results!("sigma.txt", "sigma", "sigma.json");
 /// Manual pages: one for the program and one per command.
 pub const PAGES: Leaves = results!("kinoise.1", "kinoise-");
 
+/// Hash of the demo's sealed text.
+pub const SEAL: &str = "sealed.sha256";
+
 /// A calibration, with the later stages of the demo in folders beside it.
 pub const DEMO: Leaves = Leaves::Results {
     names: &[
         CALIBRATED,
-        &["diagnosis", "map", "map-plain", "office-", "sealed", "sealed.txt", "sealed.sha256"],
+        &["diagnosis", "map", "map-plain", "office-", "sealed", "sealed.txt", SEAL],
     ],
-    marks: &["measurements.csv"],
+    marks: &[SEAL],
 };
 
 /// Begins the folder that a command fills; `inputs` are the files it reads.

@@ -78,7 +78,7 @@ enum PhysicsArgument {
 impl Arguments {
     /// Begins the folder of the new recording.
     fn folder(&self, global: &Global) -> kinoise::Result<OutputFolder> {
-        let read = [&self.model, &self.like].into_iter().flatten();
+        let read = [&self.model, &self.like, &self.room.trajectory].into_iter().flatten();
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).collect();
         begin(&self.output, Leaves::RECORDING, &inputs, global)
     }

@@ -20,7 +20,7 @@ pub struct RoomArguments {
     pub room: bool,
     /// Poses to film along: timestamp tx ty tz qx qy qz qw, z up [default: once around the desks]
     #[arg(long, value_name = "POSES", requires = "room")]
-    trajectory: Option<PathBuf>,
+    pub trajectory: Option<PathBuf>,
     /// Take every Nth pose of the path
     #[arg(long, value_name = "N", default_value_t = 1, requires = "room", value_parser = count(1, MAX_FRAMES))]
     stride: usize,

@@ -140,9 +140,8 @@ pub fn compare(
         let what = format!("no variant makes a map; the first: {why}");
         return Err(Error::recording(&sequence.root, what, "put this right, then run again"));
     }
-    let sequence_name = sequence.root.file_name().unwrap_or_default().to_string_lossy();
     Ok(Comparison {
-        sequence: sequence_name.into_owned(),
+        sequence: sequence.name(),
         rows,
         still,
         truth: sequence.truth.clone(),

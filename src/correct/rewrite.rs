@@ -57,6 +57,7 @@ pub(super) fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
     let (mut known, mut images) = (HashSet::new(), Vec::new());
     for (view, frame) in frames() {
         let file = match &frame.within {
+            Some(within) if recording.captures => format!("{:06}.png", within.index).into(),
             Some(within) => format!("depth/{:06}.png", within.index).into(),
             None => inside(root, &frame.path)?,
         };
@@ -137,7 +138,7 @@ impl Rewrite<'_> {
         recording: &Recording,
         progress: Progress<'_>,
     ) -> Result<Corrected> {
-        let others = self.other_files(images, &recording.described_by)?;
+        let others = self.other_files(images, recording)?;
         let (last, first): (Vec<&PathBuf>, Vec<&PathBuf>) =
             others.iter().partition(|f| makes_a_recording(f));
         copy(self.root, self.output, &first)?;
@@ -147,15 +148,19 @@ impl Rewrite<'_> {
             progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, images.len());
             tally
         };
-        let tallies: Result<Vec<Tally>> = images.par_iter().map(each).collect();
-        let corrected = self.sum(&tallies?, recording)?;
+        // The first error in frame order, not the first that a thread meets.
+        let tallies: Vec<Result<Tally>> = images.par_iter().map(each).collect();
+        let tallies = tallies.into_iter().collect::<Result<Vec<_>>>()?;
+        let corrected = self.sum(&tallies, recording)?;
         copy(self.root, self.output, &last)?;
         // A dump that keeps its code remains a dump; fakenect's readers know no other description.
         let assumed = self.layout != Layout::Dump && !self.root.join(DESCRIPTION).is_file();
         if self.recodes() || assumed {
             let sensor = Sensor { code: self.raw.code, ..self.sensor.clone() };
             let listed = images.iter().map(|i| (i.source.timestamp, i.file.with_extension("png")));
-            describe(self.output, self.layout, &sensor, listed)?;
+            // In a list, captures would pass for a film.
+            let layout = if recording.captures { Layout::Images } else { self.layout };
+            describe(self.output, layout, &sensor, listed)?;
         }
         Ok(corrected)
     }
@@ -164,19 +169,23 @@ impl Rewrite<'_> {
         self.raw.code != self.sensor.code
     }
 
-    /// All files except the depth images. A dump in another code also loses its index, which would claim that
-    /// the raw values are a Kinect's.
-    fn other_files(&self, images: &[Image], described_by: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    /// All files except the depth images. In another code, views that could not be read are left out, and so
+    /// is a dump's index: both would pass for that code.
+    fn other_files(&self, images: &[Image], recording: &Recording) -> Result<Vec<PathBuf>> {
         if self.layout == Layout::Container {
             return Ok(Vec::new());
         }
         let images: HashSet<&Path> = images.iter().map(|i| i.file.as_path()).collect();
-        let no_dump = self.recodes() && self.layout == Layout::Dump;
-        let descriptions = described_by.iter().filter_map(|f| f.strip_prefix(self.root).ok());
+        let old_code = |f: &Path| {
+            let mut unread = recording.excluded.iter().map(|e| Path::new(&e.view));
+            (self.layout == Layout::Dump && f == Path::new(INDEX))
+                || (self.layout == Layout::Recording && unread.any(|view| f.starts_with(view)))
+        };
+        let descriptions =
+            recording.described_by.iter().filter_map(|f| f.strip_prefix(self.root).ok());
         let read: HashSet<&Path> = images.iter().copied().chain(descriptions).collect();
         let mut files = files_below(self.root, &read)?;
-        let left_out = |f: &Path| images.contains(f) || (no_dump && f == Path::new(INDEX));
-        files.retain(|f| !left_out(f));
+        files.retain(|f| !images.contains(f.as_path()) && !(self.recodes() && old_code(f)));
         Ok(files)
     }
 
@@ -201,8 +210,9 @@ impl Rewrite<'_> {
             let (_, depth) = self.depths(&frame, image)?;
             Ok(depth.iter().filter(|z| z.is_finite()).fold(0f32, |a, &b| a.max(b)).into())
         };
-        let each: Result<Vec<f64>> = images.par_iter().map(of).collect();
-        Ok(each?.into_iter().fold(0.0, f64::max).min(FARTHEST_M))
+        let each: Vec<Result<f64>> = images.par_iter().map(of).collect();
+        let farthest = each.into_iter().try_fold(0.0, |far, z| Ok(f64::max(far, z?)))?;
+        Ok(farthest.min(FARTHEST_M))
     }
 
     fn image(&self, image: &Image) -> Result<Tally> {
@@ -210,7 +220,8 @@ impl Rewrite<'_> {
         let mut target = self.output.join(&image.file);
         let is_pgm = target.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
         // A dump in another code becomes a described sequence, whose images are PNGs.
-        if is_pgm && self.recodes() {
+        let becomes_png = self.recodes() && self.layout == Layout::Dump;
+        if becomes_png {
             target.set_extension("png");
         }
         make_folder_of(&target)?;
@@ -227,7 +238,7 @@ impl Rewrite<'_> {
         let tally = self.recode(&mut frame, &before, &after);
         let bytes = match (tally.changed, is_pgm) {
             (0, _) if !self.recodes() && source.within.is_none() => stored()?,
-            (_, true) if !self.recodes() => encode_pgm16(&frame),
+            (_, true) if !becomes_png => encode_pgm16(&frame),
             _ => encode_corrected(&frame)?,
         };
         write_atomic(&target, &bytes)?;
@@ -294,8 +305,8 @@ impl Rewrite<'_> {
         let mut remarks = recording.remarks.clone();
         remarks.extend(self.correction.remarks().iter().cloned());
         let excluded = recording.excluded.iter();
-        remarks
-            .extend(excluded.map(|e| format!("view {} is copied as it is: {}", e.view, e.reason)));
+        let kept = if self.recodes() { "left out" } else { "copied as it is" };
+        remarks.extend(excluded.map(|e| format!("view {} is {kept}: {}", e.view, e.reason)));
         remarks.extend(unread.iter().map(|why| format!("copied as it is: {why}")));
         let beyond = total(|t| t.beyond);
         if let (Some([low, high]), true) = (self.correction.learnt_px(), beyond * 100 > measured) {

@@ -69,7 +69,9 @@ pub fn sigma_images(
         progress.step(done.fetch_add(1, Ordering::Relaxed) + 1, sequence.moments.len());
         Ok(found)
     };
-    let all = sequence.moments.par_iter().zip(&names).map(one).collect::<Result<Vec<_>>>()?;
+    // The first error in frame order, not the first that a thread meets.
+    let all: Vec<Result<_>> = sequence.moments.par_iter().zip(&names).map(one).collect();
+    let all = all.into_iter().collect::<Result<Vec<_>>>()?;
     let mut list = String::from("# timestamp path\n");
     for (moment, name) in sequence.moments.iter().zip(&names) {
         // Writing to a String does not fail.

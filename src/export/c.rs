@@ -9,6 +9,7 @@ use crate::correct::Correction;
 use crate::error::Result;
 use crate::frame::DepthCode;
 use crate::model::NoiseModel;
+use crate::terms::ROOM_LUX;
 use crate::view::Sensor;
 
 const PREFIX: &str = "kinoise_";
@@ -98,6 +99,7 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
         ("cy", camera.cy),
         ("has_distortion", f64::from(u8::from(camera.distortion.is_some()))),
         ("scale_px_m", correction.scale_px_m),
+        ("room_lux", ROOM_LUX),
         ("scale", correction.scale),
         ("ray_share", correction.ray_share),
         ("locking_px", locking_px),

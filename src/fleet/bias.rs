@@ -76,9 +76,9 @@ fn usable(term: &Term) -> bool {
 
 /// The camera, and depth times disparity, px m.
 fn scale(model: &NoiseModel) -> Option<(Camera, f64)> {
-    let sensor = model.sensor.as_ref()?;
-    let baseline = sensor.baseline_m.unwrap_or(KINECT_BASELINE_M);
-    Some((sensor.camera.clone(), sensor.camera.fx * baseline))
+    let sensor = model.described_sensor().ok()??;
+    let scale = sensor.scale_px_m();
+    Some((sensor.camera, scale))
 }
 
 /// Distances at which all models have learnt their biases, near to far; empty if they have none in common.

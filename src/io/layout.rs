@@ -139,6 +139,7 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
         views: Vec::new(),
         excluded: Vec::new(),
         remarks: Vec::new(),
+        captures: false,
         described_by: vec![path],
     };
     for folder in entries(root)? {

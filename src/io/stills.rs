@@ -55,6 +55,7 @@ pub(super) struct Footage {
 impl Footage {
     /// Recording `cut` into views, or with all frames as one view, in motion or not.
     pub fn recording(self, root: &Path, sensor: Sensor, cut: bool) -> Recording {
+        let captures = self.film == Film::Captures;
         let (mut views, mut remarks) = if cut {
             cut_up(self.frames, self.film, &sensor)
         } else {
@@ -72,6 +73,7 @@ impl Footage {
             views,
             excluded: Vec::new(),
             remarks,
+            captures,
             described_by: self.described_by,
         }
     }

@@ -94,9 +94,11 @@ impl<'a> Tracker<'a> {
         };
         report.repeated = last.raw == frame.raw;
         let seen = stages.time("start", || self.seen_motion(last, &frame))?;
-        let start = seen.unwrap_or(match self.options.init {
-            Init::None => Isometry3::identity(),
-            Init::Motion | Init::Orb => self.motion_by(report.stamp),
+        let in_colour = frame.features.is_some() && last.features.is_some();
+        let start = seen.unwrap_or_else(|| match self.options.init {
+            Init::Motion => self.motion_by(report.stamp),
+            Init::Orb if in_colour => self.motion_by(report.stamp),
+            Init::Orb | Init::None => Isometry3::identity(),
         });
         let mut alignment = self.align(last, &frame, start, stages);
         if self.options.readout_s > 0.0 {

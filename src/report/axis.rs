@@ -105,7 +105,7 @@ pub(super) fn round_up(value: f64) -> f64 {
 }
 
 fn widened(low: f64, high: f64) -> [f64; 2] {
-    if high > low * (1.0 + f64::EPSILON) || high > low && low <= 0.0 {
+    if high - low > f64::EPSILON * low.abs().max(high.abs()) {
         return [low, high];
     }
     let by = if low == 0.0 { 1.0 } else { WIDEN * low.abs() };

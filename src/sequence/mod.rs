@@ -57,6 +57,12 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// Name of the folder, also where it was given as `.` or `..`.
+    pub fn name(&self) -> String {
+        let whole = self.root.canonicalize().unwrap_or_else(|_| self.root.clone());
+        whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     /// Keeps every `stride`-th moment, at most `limit` of them.
     pub fn thin(&mut self, stride: usize, limit: Option<usize>) {
         let moments = std::mem::take(&mut self.moments);

@@ -114,7 +114,7 @@ pub struct PixelContext {
     pub temperature_c: f64,
     /// Brightness of the surface in infrared over the recording's median; 1 where there is no infrared.
     pub light: f64,
-    /// Ambient light, lx; 0 where unknown.
+    /// Ambient light, lx; where unknown, 0 in a diagnosis and [`ROOM_LUX`] in a correction.
     pub ambient: f64,
     /// Model's variance of a pixel's disparity, px^2.
     pub variance: f64,

@@ -171,14 +171,14 @@ const SESSION_S: f64 = 400.0;
 const TEMPERATURE_C: f64 = 23.5;
 const AMBIENT_LUX: f64 = 300.0;
 
-/// The conditions with and without a thermometer.
+/// The conditions with and without a thermometer and a light meter.
 fn conditions() -> [Conditions; 2] {
     let known = Conditions {
         session_s: SESSION_S,
         temperature_c: Some(TEMPERATURE_C),
         ambient_lux: Some(AMBIENT_LUX),
     };
-    [known, Conditions { temperature_c: None, ..known }]
+    [known, Conditions { session_s: SESSION_S, ..Conditions::default() }]
 }
 
 const INSTANT: Instant = Instant { view: 0, frame: 0, session_s: SESSION_S, view_s: 0.0 };
@@ -320,11 +320,10 @@ read = lambda name: np.fromfile(name)
 z, theta = read('places').reshape(-1, 2).T
 model.sigma(z, theta).tofile('surface')
 depth = read('depth').reshape(model.HEIGHT, model.WIDTH)
-for k, celsius in enumerate((23.5, None)):
-    known = dict(session_s=400.0, temperature_c=celsius, ambient_lux=300.0)
-    model.correct(depth, **known).tofile(f'corrected{k}')
-    model.sigma_image(depth, **known).tofile(f'sigma{k}')
-known['temperature_c'] = 23.5
+known = dict(session_s=400.0, temperature_c=23.5, ambient_lux=300.0)
+for k, conditions in enumerate((known, dict(session_s=400.0))):
+    model.correct(depth, **conditions).tofile(f'corrected{k}')
+    model.sigma_image(depth, **conditions).tofile(f'sigma{k}')
 model.sample(read('true'), read('normals').reshape(-1, 3), read('noise'), **known).tofile('sampled')
 ";
 
@@ -363,7 +362,7 @@ static void put(const char *name, const double *from, size_t n)
 int main(void)
 {
     size_t n = get("places", places, 10000) / 2, i;
-    kinoise_conditions known = {400.0, 1, 23.5, 300.0}, no_thermometer = {400.0, 0, 0.0, 300.0};
+    kinoise_conditions known = {400.0, 1, 23.5, 1, 300.0}, unmeasured = {400.0};
     for (i = 0; i < n; i++)
         places[i] = kinoise_sigma(places[2 * i], places[2 * i + 1]);
     put("surface", places, n);
@@ -373,13 +372,13 @@ int main(void)
     if (kinoise_correct(stored, out, &known))
         return 1;
     put("corrected0", out, PIXELS);
-    if (kinoise_correct(stored, out, &no_thermometer))
+    if (kinoise_correct(stored, out, &unmeasured))
         return 1;
     put("corrected1", out, PIXELS);
     if (kinoise_sigma_image(stored, out, &known))
         return 1;
     put("sigma0", out, PIXELS);
-    if (kinoise_sigma_image(stored, out, &no_thermometer))
+    if (kinoise_sigma_image(stored, out, &unmeasured))
         return 1;
     put("sigma1", out, PIXELS);
     get("true", depth, PIXELS);

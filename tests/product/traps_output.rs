@@ -120,6 +120,7 @@ fn what_others_wrote_is_not_overwritten() {
         ("map film --block 2 -o cal", "measurements.csv"),
         ("compare film --frames 6 -o dia", "diagnosis.json"),
         ("demo -o dia", "diagnosis.json"),
+        ("demo -o cal", "measurements.csv"),
         ("simulate film --shrink 8 --frames 1", "not empty"),
         ("simulate thesis --shrink 8 --frames 1", "chapter.tex"),
         ("simulate thesis --shrink 8 --frames 1 --force", "chapter.tex"),

@@ -82,7 +82,7 @@ impl Baseline {
             let (w, t) = (mean(ours), mean(theirs));
             if w > 0.0 && t > 0.0 {
                 let clumps = scatter(ours).max(scatter(theirs));
-                view.log_variance_inflation = clumps * (w + t) / t;
+                view.log_variance_inflation *= clumps * (w + t) / t;
             }
         }
     }

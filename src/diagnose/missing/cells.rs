@@ -226,7 +226,7 @@ impl Scatter {
     pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], min: Scatter) -> Self {
         let (mut sums, mut n) = ([0.0; 4], [0.0; 4]);
         let mut neighbours = Neighbours::default();
-        for (cells, left) in views.iter().zip(left) {
+        for (cells, left) in views.iter().zip(left).filter(|(cells, _)| !cells.is_empty()) {
             let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0, differing: 1.0, clump: 4.0 };
             let w = Whitener::of(cells, loose);
             let own = w.own(left);

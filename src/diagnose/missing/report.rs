@@ -17,7 +17,7 @@ use crate::diagnose::finding::shape::digits;
 use crate::diagnose::views::field::Field;
 use crate::effects;
 use crate::stats::range;
-use crate::terms::{Axis, Basis, Extent, Statistic};
+use crate::terms::{Axis, Basis, Coordinate, Extent, Statistic, corner_radius};
 
 /// Lost share from which an effect matters.
 const MATTERS: f64 = 0.05;
@@ -133,8 +133,10 @@ impl DropoutReporter<'_> {
     fn curve(&self, basis: &Basis, finding: &mut Finding) {
         let (span, at): ([f64; 2], At) = match basis {
             Basis::Curve { over, low, high, .. } => {
-                let over = *over;
-                ([*low, *high], Box::new(move |c| Some(over.value(c.place))))
+                let (over, corner) = (*over, corner_radius(self.camera));
+                let unit = if over == Coordinate::Radius { corner } else { 1.0 };
+                let value = move |c: &Cell<'_>| Some(unit * over.value(c.place));
+                ([unit * low, unit * high], Box::new(value))
             }
             _ => ([0.0, self.camera.width as f64], Box::new(|c| Some(c.place.u))),
         };

@@ -194,8 +194,11 @@ impl<'a> Losses<'a> {
                 Halves::of(&views, &second, 0.0, &[1])?.replicate(&[0], 0.0)
             }
             Shape::Curve(basis) => {
-                let evidence = self.evidence(basis);
-                Halves::of(&evidence, second, CURVE_PRECISION, &[basis.count()])?
+                let views = self.evidence(basis).into_iter().zip(self.views).zip(second);
+                let views = views.filter(|((_, cells), _)| !cells.is_empty());
+                let (evidence, second): (Vec<_>, Vec<_>) =
+                    views.map(|((evidence, _), second)| (evidence, *second)).unzip();
+                Halves::of(&evidence, &second, CURVE_PRECISION, &[basis.count()])?
                     .replicate(&[0], 0.0)
             }
         }

@@ -136,8 +136,10 @@ fn grid(
     if is_told_apart(Axis::Theta, reach) {
         let [low, high] = reach.theta;
         // The corner of the picture sees a plane turned away from it more steeply by its own ray's angle.
-        let corner = (high + corner_radius(camera).atan()).min(FRAC_PI_2);
-        for (incidence, steepest) in [(false, high + 4f64.to_radians()), (true, corner)] {
+        let corner = (corner_radius(camera) / camera.fx).atan();
+        for (incidence, steepest) in
+            [(false, high + 4f64.to_radians()), (true, (high + corner).min(FRAC_PI_2))]
+        {
             for middle in (0..MIDDLES).map(|k| low + along(k) * (steepest - low)) {
                 let step = |deg: &f64| Step::whole(Axis::Theta, middle, deg.to_radians());
                 widths_deg.iter().for_each(|deg| add(Step { incidence, ..step(deg) }));

@@ -31,7 +31,7 @@ static inline kinoise_place kinoise_at(int i, const kinoise_conditions *known)
     p.rho = p.variance = p.disparity = p.z = 1.0;
     p.session_s = known->session_s;
     p.temperature_c = known->has_temperature ? known->temperature_c : 0.0;
-    p.ambient = known->ambient_lux;
+    p.ambient = known->has_ambient ? known->ambient_lux : kinoise_room_lux;
     return p;
 }
 

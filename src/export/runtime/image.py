@@ -172,7 +172,7 @@ def _solve(p, measured, slopes, temperature_c):
     return d
 
 
-def correct(depth_m, session_s=0.0, temperature_c=None, ambient_lux=0.0):
+def correct(depth_m, session_s=0.0, temperature_c=None, ambient_lux=500.0):
     """Depth without the sensor's biases, m. NaN and 0 stay; infinite where no disparity is left."""
     shape = np.shape(depth_m)
     z, d, pixels = _measured(depth_m, session_s)
@@ -184,7 +184,7 @@ def correct(depth_m, session_s=0.0, temperature_c=None, ambient_lux=0.0):
     return z.reshape(shape)
 
 
-def sigma_image(depth_m, session_s=0.0, temperature_c=None, ambient_lux=0.0):
+def sigma_image(depth_m, session_s=0.0, temperature_c=None, ambient_lux=500.0):
     """Standard deviation of each depth as stored, m: sigma at the corrected depth and the surface's
     tilt, times what the model says of the pixel's noise beyond it. NaN where there is no depth."""
     shape = np.shape(depth_m)

@@ -4,11 +4,12 @@ typedef struct {
     double session_s, temperature_c, ambient;
 } kinoise_place;
 
-/* What is known of a frame; {0} where nothing is. */
+/* What is known of a frame; {0} where nothing is: a lit room. */
 typedef struct {
     double session_s;
     int has_temperature;
     double temperature_c;
+    int has_ambient;
     double ambient_lux;
 } kinoise_conditions;
 

@@ -102,9 +102,10 @@ impl Survey {
     fn of(bag: &dyn Bag, depth: DepthTopic) -> Result<Self> {
         let Topic { logged_ns, .. } = &bag.topics()[depth.topic];
         let numbers = || (0..logged_ns.len()).into_par_iter();
-        let heads: Result<Vec<(i64, (usize, usize))>> =
+        // The first error in frame order, not the first that a thread meets.
+        let heads: Vec<Result<(i64, (usize, usize))>> =
             numbers().map(|number| Self::head(bag, depth, number)).collect();
-        let heads = heads?;
+        let heads = heads.into_iter().collect::<Result<Vec<_>>>()?;
         let mut stamps_ns: Vec<i64> = heads.iter().map(|h| h.0).collect();
         let unstamped = stamps_ns.iter().all(|&ns| ns == 0);
         if unstamped {

@@ -109,6 +109,35 @@ fn a_plain_folder_goes_on_as_a_described_one() {
     assert!(kinoise::io::open(&out, &Assumed::default()).is_ok());
 }
 
+/// Five captures of a pose are a view; in a film, they would be motion.
+#[test]
+fn a_stack_of_captures_stays_one() {
+    let files = Files::new();
+    let raw = files.recording(RAW, Vec::new());
+    files.model(&small(vec![bowl(0.5)]));
+    let mut source = FrameSource::new(160, 120);
+    let (mut words, mut frames) = (Vec::new(), 0);
+    for (view, copies) in
+        open_uncut(&raw, &Assumed::default()).expect("opened").views[..2].iter().zip([6, 2])
+    {
+        for k in (0..copies).flat_map(|_| 0..view.depth.len()) {
+            let frame = source.read(&view.depth[k].path).expect("read");
+            words.extend(frame.raw.iter().flat_map(|word| word.to_le_bytes()));
+            frames += 1;
+        }
+    }
+    let head =
+        format!("{{'descr': '<u2', 'fortran_order': False, 'shape': ({frames}, 120, 160), }}");
+    let head = format!("{head:<117}\n");
+    let size = u16::try_from(head.len()).expect("short").to_le_bytes();
+    let stack = [&b"\x93NUMPY\x01\0"[..], &size[..], head.as_bytes(), &words[..]].concat();
+    fs::write(files.at("stack.npy"), stack).expect("written");
+    let code = "--raw-disparity=3.3309495161,-0.0030711016";
+    files.correct(&files.at("stack.npy"), &["--intrinsics", "145.25,145,79.5,59.5", code]);
+    let again = kinoise::io::open(&files.at("out"), &Assumed::default()).expect("described");
+    assert_eq!(again.views.iter().map(|v| v.depth.len()).collect::<Vec<_>>(), [12, 4]);
+}
+
 /// A shift by 6.9 px of disparity leaves no depth beyond 1.6 m: such pixels are clamped to the code's end,
 /// and reported.
 #[test]

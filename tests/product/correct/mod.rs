@@ -7,7 +7,7 @@ use kinoise::correct::{
     Conditions, CorrectOptions, Correction, SIGMA_UNITS_PER_METRE, correct_recording,
 };
 use kinoise::effects::Active;
-use kinoise::io::{Assumed, FrameSource, open_uncut};
+use kinoise::io::{Assumed, FrameSource, encode_pgm16, open_uncut};
 use kinoise::model::{Covariance, Domain, Effect, FitSummary, Provenance, UNEXPLAINED};
 use kinoise::scene::{Bench, Seen, Target};
 use kinoise::simulate::{FormulaSensor, Physics, Scenery, Shoot, kinect_v1, plan_grid};
