@@ -13,6 +13,7 @@ use super::search::outcome::Outcome;
 use super::search::rules::LATER_LEVEL;
 use super::steps::lattice::Quantisation;
 use super::steps::measure_steps;
+use super::steps::rounding::Rounding;
 use super::views::column_steps::column_steps;
 use super::views::field::Field;
 use super::views::known::KnownTerms;
@@ -97,7 +98,8 @@ impl<'a> Case<'a> {
         let lattice = measure_steps(&mut fields, recording, &bench.rays);
         let kept = KeptPattern::of(&fields);
         let learnt = (learnt_from(model, &known, options, simulated.is_some()), &known);
-        let survey = survey((&fields, &kept), &bench, baseline.as_ref(), options, learnt, model);
+        let survey =
+            survey((&fields, &kept, &lattice), &bench, baseline.as_ref(), options, learnt, model);
         Ok(Case {
             recording,
             model,
@@ -130,7 +132,7 @@ impl<'a> Case<'a> {
         // Two surveys at once are a quarter of all memory.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
-        let views = (&fields[..], &self.kept);
+        let views = (&fields[..], &self.kept, &self.lattice);
         let mut survey = survey(views, bench, baseline, self.options, learnt, model);
         // What remains is weighted at least as much as what was explained.
         if baseline.is_none() {
@@ -234,7 +236,7 @@ impl<'a> Case<'a> {
 }
 
 fn survey(
-    (fields, kept): (&[Field], &KeptPattern),
+    (fields, kept, lattice): (&[Field], &KeptPattern, &Quantisation),
     bench: &Workbench<'_>,
     baseline: Option<&Baseline>,
     options: &DiagnoseOptions,
@@ -242,6 +244,7 @@ fn survey(
     model: &NoiseModel,
 ) -> Survey {
     let mut survey = Survey::of(fields, bench);
+    survey.rounding = Rounding::of(lattice, survey.views.iter().flat_map(|v| v.places.iter()));
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
     let still = still(&beside_bias(fields, &[]), kept);

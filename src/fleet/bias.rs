@@ -13,7 +13,6 @@ use super::unit::UnitModel;
 use crate::camera::Camera;
 use crate::model::{Effect, NoiseModel};
 use crate::plane::Plane;
-use crate::sensors::KINECT_BASELINE_M;
 use crate::terms::{PixelContext, Pixels, Term};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

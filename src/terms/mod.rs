@@ -23,7 +23,7 @@ pub(crate) use modulation::disparity_power;
 pub use modulation::{DISPARITY_UNIT_PX, Modulation};
 pub use needs::Needs;
 pub use pixels::Pixels;
-pub use place::{Axis, Extent, PixelContext, corner_radius};
+pub use place::{Axis, Extent, GroupMean, PixelContext, corner_radius};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -93,7 +93,7 @@ class Sensor:
                 d = frame(v, d)
             depth = self.depth(PX_M / np.maximum(d, 1.0))
             seen = (depth > 0.35) & (depth < 9) & (self.rng.random(z.shape) < kept)
-            self.save(folder, "depth", k, time, np.where(seen, self.word(np.rint(depth * UNITS)), 0))
+            self.save(folder, "depth", k, time, np.where(seen, self.word(depth * UNITS), 0))
             if self.print:
                 ray2 = 1 + x * x + y * y
                 light = 2000 * self.print(v) * np.where(on, slope, 1) / np.sqrt(ray2) / (z * z * ray2)

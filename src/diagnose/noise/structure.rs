@@ -12,6 +12,7 @@ use super::texture::{
     frame_log_variance, moving, same_pixel, without_lines,
 };
 use crate::diagnose::options::FRAMES_KEPT;
+use crate::diagnose::steps::rounding::rounded_alike;
 use crate::diagnose::views::box_sums::repeats_of_box;
 use crate::diagnose::views::field::Field;
 use crate::stats::{Correlation, LONGEST_LAG, mean};
@@ -149,11 +150,12 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let Some(first) = frames.first() else { return (s, short) };
     s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
     s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
+    let rounded = rounded_alike(field);
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, field.width, SHORT_LINE)).collect();
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
-        s.lagged[lag - 1] = mean(pairs);
+        s.lagged[lag - 1] = mean(pairs).map(|rho| rho - rounded);
     }
     (s.frame_log_variance, s.frame_pixels) = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();

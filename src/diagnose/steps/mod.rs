@@ -3,6 +3,7 @@
 mod coarse;
 pub mod comb;
 pub mod lattice;
+pub mod rounding;
 
 use crate::camera::Rays;
 use crate::diagnose::diagnosis::{Finding, Size};

@@ -6,6 +6,7 @@ use super::box_sums::SMOOTH_PX;
 use super::samples::{ViewData, in_patches};
 use super::surveyed_view::SurveyedView;
 use super::tiles::SIDE;
+use crate::diagnose::steps::rounding::Rounding;
 use crate::stats::median;
 use crate::terms::DARKEST;
 
@@ -34,7 +35,12 @@ pub fn block_tiles(views: &[SurveyedView], width: usize) -> usize {
 /// Log ratio of the measured variance to the model's, block by block, with the view's own level as a free
 /// nuisance. With `by_light`, blocks are split by light: the mean over light and dark parts would be the
 /// noise of neither.
-pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
+pub fn blocks(
+    view: &SurveyedView,
+    tiles: usize,
+    by_light: bool,
+    rounding: Option<&Rounding>,
+) -> ViewData {
     let side = (tiles * SIDE) as f64;
     let first = view.places.first().map_or(1.0, |p| p.light);
     let lit = by_light && view.places.iter().any(|p| p.light != first);
@@ -50,8 +56,10 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
     let groups = in_patches(&view.places, side, |i| is_measured(i).then(|| octave(i)));
     // Share of the variance removed with the box mean.
     let taken = view.correlation.sum / (SMOOTH_PX * SMOOTH_PX) as f64;
-    let kept = if view.between_frame_factor.is_some() { 1.0 } else { 1.0 - taken };
+    let between = view.between_frame_factor.is_some();
+    let kept = if between { 1.0 } else { 1.0 - taken };
     let mut blocks = ViewData { precision: vec![0.0], ..ViewData::default() };
+    blocks.precision.resize(1 + rounding.map_or(0, |_| Rounding::COLUMNS), 1.0);
     for group in groups {
         let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
             group.iter().map(|&i| view.tiles[i].pixels * of(i)).sum()
@@ -70,9 +78,13 @@ pub fn blocks(view: &SurveyedView, tiles: usize, by_light: bool) -> ViewData {
         Arc::make_mut(&mut blocks.places).push(place);
         // The mean of log chi^2 / n is about -1 / n. Pixels correlate with others outside the block, which
         // lowers the information of all blocks together but not that of one.
-        blocks.response.push((ratio / repeated / kept.max(0.5)).ln() + 1.0 / within);
+        let rounded = rounding.map(|r| r.of_log_variance(&view.places, &|of| sum(of) / n, between));
+        let (waves, level) = rounded.unzip();
+        let level = level.unwrap_or(0.0) - 1.0 / within;
+        blocks.response.push((ratio / repeated / kept.max(0.5)).ln() - level);
         blocks.weight.push(0.5 * worth / (1.0 + 1.0 / worth) / view.log_variance_inflation);
         blocks.nuisance.push(1.0);
+        blocks.nuisance.extend(waves.iter().flatten());
     }
     blocks
 }
@@ -116,14 +128,14 @@ mod tests {
             (PixelContext { u, v, light, ..PixelContext::default() }, tile)
         };
         let view = SurveyedView::white((0..ACROSS * ACROSS).map(patch), 3.0);
-        let data = blocks(&view, BLOCK_TILES, true);
+        let data = blocks(&view, BLOCK_TILES, true, None);
         assert_eq!(data.places.len(), 200, "two parts of a hundred blocks");
         for (place, log_variance) in data.places.iter().zip(&data.response) {
             assert!([0.25, 2.0].iter().any(|grey| (place.light / grey - 1.0).abs() < 1e-9));
             // The correction of the mean of log chi^2 is one over the block's independent samples.
             assert!((log_variance + place.light.ln()).abs() < 2.0 / 400.0, "{log_variance}");
         }
-        let whole = blocks(&view, BLOCK_TILES, false);
+        let whole = blocks(&view, BLOCK_TILES, false, None);
         assert_eq!(whole.places.len(), 100, "a simulation is compared block by block");
     }
 }

@@ -15,6 +15,7 @@ use crate::diagnose::checks::replication::halves;
 use crate::diagnose::noise::lagged::of_any_two_frames;
 use crate::diagnose::options::Ablation;
 use crate::diagnose::search::view_levels::{MODEL_TOLERANCE, view_scatter};
+use crate::diagnose::steps::rounding::Rounding;
 use crate::effects::Flat;
 use crate::measure::Workbench;
 use crate::sensors::SensorKind;
@@ -44,6 +45,8 @@ pub struct Survey {
     pub learnt_from: [Option<Learnt>; 2],
     /// Scatter of single views about the model, one standard deviation a term: of the mean, of the variance.
     pub between: Arc<[Vec<Term>; 2]>,
+    /// Steps whose waves show in single views.
+    pub rounding: Option<Rounding>,
     pub ablation: Ablation,
 }
 
@@ -122,6 +125,7 @@ impl Survey {
             refits_sigma: false,
             learnt_from: [None; 2],
             between: Arc::default(),
+            rounding: None,
             ablation: Ablation::None,
         }
     }
@@ -146,13 +150,20 @@ impl Survey {
 
     /// Mean residuals of the views, each about a plane of its own.
     pub fn mean_data(&self) -> Vec<ViewData> {
-        self.views.par_iter().map(|v| mean_data(v).beside(&self.between[0])).collect()
+        self.views.par_iter().map(|v| self.mean_of(v).beside(&self.between[0])).collect()
     }
 
     /// Same as [`Survey::mean_data`], in larger patches.
     pub fn coarse_mean_data(&self) -> Vec<ViewData> {
-        let coarse = |v| coarser(&mean_data(v), COARSE_PX).beside(&self.between[0]);
+        let coarse = |v| coarser(&self.mean_of(v), COARSE_PX).beside(&self.between[0]);
         self.views.par_iter().map(coarse).collect()
+    }
+
+    /// Mean residuals of a view beside its plane and the waves of rounding.
+    fn mean_of(&self, view: &SurveyedView) -> ViewData {
+        let data = mean_data(view);
+        let Some(rounding) = &self.rounding else { return data };
+        data.beside_columns(Rounding::COLUMNS, |p| rounding.of_mean(p).to_vec())
     }
 
     /// Survey of the views with these indices. Its searches are not tested for significance or replication.
@@ -234,12 +245,13 @@ impl Survey {
 
     /// Log ratio of the measured variance to the model's, block by block.
     pub fn variance_data(&self) -> Vec<ViewData> {
-        let of = |v: &SurveyedView| blocks(v, self.block_tiles, self.by_light);
-        let blocks: Vec<ViewData> = self.views.par_iter().map(of).collect();
+        let of =
+            |v: &SurveyedView| blocks(v, self.block_tiles, self.by_light, self.rounding.as_ref());
+        let mut blocks: Vec<ViewData> = self.views.par_iter().map(of).collect();
         // The prior variance of a view's level is the scatter of the views.
-        let precision = vec![1.0 / view_scatter(&blocks, self.tolerance)];
-        let held = |b| ViewData { precision: precision.clone(), ..b };
-        blocks.into_iter().map(|b| held(b).beside(&self.between[1])).collect()
+        let level = 1.0 / view_scatter(&blocks, self.tolerance);
+        blocks.iter_mut().for_each(|b| b.precision[0] = level);
+        blocks.into_iter().map(|b| b.beside(&self.between[1])).collect()
     }
 
     /// Whether each view is in the second half.

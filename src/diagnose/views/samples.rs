@@ -51,17 +51,25 @@ impl ViewData {
     }
 
     /// Adds these terms to the view's nuisances, each with a standard normal amplitude.
-    pub fn beside(mut self, terms: &[Term]) -> Self {
-        if terms.is_empty() {
+    pub fn beside(self, terms: &[Term]) -> Self {
+        self.beside_columns(terms.len(), |place| terms.iter().map(|t| t.value(place)).collect())
+    }
+
+    /// Same for `count` columns, by place.
+    pub fn beside_columns(
+        mut self,
+        count: usize,
+        columns: impl Fn(&PixelContext) -> Vec<f64>,
+    ) -> Self {
+        if count == 0 {
             return self;
         }
         let own = self.nuisance.chunks_exact(self.precision.len()).zip(self.places.iter());
         let with = |(own, place): (&[f64], &PixelContext)| {
-            let more = terms.iter().map(|t| finite(t.value(place)));
-            own.iter().copied().chain(more).collect::<Vec<f64>>()
+            own.iter().copied().chain(columns(place).into_iter().map(finite)).collect::<Vec<f64>>()
         };
         self.nuisance = own.flat_map(with).collect();
-        self.precision.extend(terms.iter().map(|_| 1.0));
+        self.precision.resize(self.precision.len() + count, 1.0);
         self
     }
 }

@@ -246,7 +246,7 @@ mod tests {
         let mut held = view();
         held.tiles_mut().for_each(|(_, tile)| tile.noise_variance *= 2.0);
         assert_eq!(mean_data(&held).weight, mean_data(&first).weight);
-        let [before, after] = [&first, &held].map(|v| blocks(v, BLOCK_TILES, false).response);
+        let [before, after] = [&first, &held].map(|v| blocks(v, BLOCK_TILES, false, None).response);
         assert!(!before.is_empty());
         for (before, after) in before.iter().zip(&after) {
             approx::assert_relative_eq!(before - after, 2f64.ln(), epsilon = 1e-12);
