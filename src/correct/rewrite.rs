@@ -185,7 +185,7 @@ impl Rewrite<'_> {
             recording.described_by.iter().filter_map(|f| f.strip_prefix(self.root).ok());
         let read: HashSet<&Path> = images.iter().copied().chain(descriptions).collect();
         let mut files = files_below(self.root, &read)?;
-        files.retain(|f| !images.contains(f.as_path()) && !(self.recodes() && old_code(f)));
+        files.retain(|f| !(images.contains(f.as_path()) || self.recodes() && old_code(f)));
         Ok(files)
     }
 

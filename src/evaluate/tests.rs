@@ -10,7 +10,12 @@ fn real() -> Option<PathBuf> {
     let data = std::env::var_os("KINOISE_DATA").map(PathBuf::from);
     let root = data
         .unwrap_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")));
-    Some(root.join("tum_trajectories")).filter(|p| p.is_dir())
+    let folder = root.join("tum_trajectories");
+    if !folder.is_dir() {
+        println!("skipped: {} is not here; set KINOISE_DATA", folder.display());
+        return None;
+    }
+    Some(folder)
 }
 
 /// Every value that the scripts report, to the digits they print.

@@ -65,7 +65,7 @@ impl Quantisation {
 
 impl RawHistogram {
     pub fn merge(&mut self, other: &RawHistogram) {
-        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
+        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a = a.saturating_add(*b));
     }
 
     fn occurring(&self) -> Vec<(usize, f64)> {

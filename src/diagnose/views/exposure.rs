@@ -132,7 +132,8 @@ impl Field {
                 continue;
             }
             self.measured[k] += 1;
-            self.words.0[usize::from(word)] += 1;
+            let count = &mut self.words.0[usize::from(word)];
+            *count = count.saturating_add(1);
             let e = (self.scale_px_m / f64::from(z)) as f32 - expected[k];
             if keep {
                 residuals[k] = e;
