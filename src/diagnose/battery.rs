@@ -90,7 +90,7 @@ impl Case<'_> {
         let scatter = self.scatter(&mut mean);
         self.at("naming, and searching the lost pixels", "naming what is left");
         let second = self.survey.second();
-        let lattice = &self.lattice;
+        let lattice = self.lattice;
         let steps = steps(lattice, &self.known, &self.fields, self.recording, &second);
         let own_step = own_step(lattice, self.recording, self.fields[0].scale_px_m);
         self.remarks.extend(own_step.map(own_step_note));
@@ -155,19 +155,19 @@ impl Case<'_> {
     /// Whether a finding is more than a consequence of steps, which shift the mean within a step, or of gross
     /// errors, which add to the variance.
     fn is_news(&self, f: &Finding, scatter: &ScatterResult) -> bool {
-        let coarsest = self.lattice.step_px(self.fields[0].scale_px_m, self.survey.reach.z[0]);
+        let (px_m, near) = (self.fields[0].scale_px_m, self.survey.reach.z[0]);
+        let coarsest = self.lattice.map_or(0.0, |step| step.px(px_m, near));
         let sigma_px = typical_sigma_px(&self.fields);
         // A fine step acts like noise and shifts the mean by less than a four-hundredth.
         let of_steps = matches!(f.statistic, Statistic::Bias | Statistic::Variance)
             && coarsest > COARSE_SIGMAS * sigma_px;
         // Steps of depth have no period in the disparity, but a few of them look periodic.
-        let aliases = self.lattice.depth.is_some()
-            || self.lattice.disparity.is_some_and(|step| step.size > LOCKING_WAVE_PX);
+        let aliases = self.lattice.is_some_and(|s| s.is_of_depth || s.size > LOCKING_WAVE_PX);
         let aliased = aliases && f.axis == Axis::DisparityPhase;
         let stepped = of_steps
             && (f.effect.is_none() || aliased)
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
-            && own_step(&self.lattice, self.recording, self.fields[0].scale_px_m).is_none()
+            && own_step(self.lattice, self.recording, px_m).is_none()
             && f.size.sigma * sigma_px < 0.3 * coarsest;
         let of_all =
             |t: &TextureFinding| t.of_some.is_none() && t.statistic != Statistic::Distribution;

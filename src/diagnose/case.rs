@@ -11,7 +11,7 @@ use super::noise::still::{KeptPattern, beside_bias, still};
 use super::options::{Ablation, DiagnoseOptions, measure_options};
 use super::search::outcome::Outcome;
 use super::search::rules::LATER_LEVEL;
-use super::steps::lattice::Quantisation;
+use super::steps::lattice::Step;
 use super::steps::measure_steps;
 use super::steps::rounding::Rounding;
 use super::views::column_steps::column_steps;
@@ -42,7 +42,8 @@ pub struct Case<'a> {
     /// Share of a fixed pattern that remains after the means are subtracted.
     pub kept: KeptPattern,
     /// Steps of the raw words.
-    pub lattice: Quantisation,
+    /// Step of the stored words.
+    pub lattice: Option<Step>,
     /// Losses. The second run reuses those of the first, whose sigma tells how hard an end of the range is.
     pub losses: OnceLock<DropoutOutcome>,
     pub excluded: Vec<Excluded>,
@@ -99,7 +100,7 @@ impl<'a> Case<'a> {
         let kept = KeptPattern::of(&fields);
         let learnt = (learnt_from(model, &known, options, simulated.is_some()), &known);
         let survey =
-            survey((&fields, &kept, &lattice), &bench, baseline.as_ref(), options, learnt, model);
+            survey((&fields, &kept, lattice), &bench, baseline.as_ref(), options, learnt, model);
         Ok(Case {
             recording,
             model,
@@ -132,7 +133,7 @@ impl<'a> Case<'a> {
         // Two surveys at once are a quarter of all memory.
         drop(self.survey);
         let (bench, baseline) = (&self.bench, self.baseline.as_ref());
-        let views = (&fields[..], &self.kept, &self.lattice);
+        let views = (&fields[..], &self.kept, self.lattice);
         let mut survey = survey(views, bench, baseline, self.options, learnt, model);
         // What remains is weighted at least as much as what was explained.
         if baseline.is_none() {
@@ -236,7 +237,7 @@ impl<'a> Case<'a> {
 }
 
 fn survey(
-    (fields, kept, lattice): (&[Field], &KeptPattern, &Quantisation),
+    (fields, kept, lattice): (&[Field], &KeptPattern, Option<Step>),
     bench: &Workbench<'_>,
     baseline: Option<&Baseline>,
     options: &DiagnoseOptions,

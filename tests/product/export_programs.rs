@@ -362,7 +362,7 @@ static void put(const char *name, const double *from, size_t n)
 int main(void)
 {
     size_t n = get("places", places, 10000) / 2, i;
-    kinoise_conditions known = {400.0, 1, 23.5, 1, 300.0}, unmeasured = {400.0};
+    kinoise_conditions known = {400.0, 1, 23.5, 1, 300.0}, unmeasured = {400.0, 0, 0.0, 0, 0.0};
     for (i = 0; i < n; i++)
         places[i] = kinoise_sigma(places[2 * i], places[2 * i + 1]);
     put("surface", places, n);

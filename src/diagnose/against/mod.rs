@@ -18,7 +18,7 @@ use crate::diagnose::noise::tails::{Confusers, tails};
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::{texture_findings, window};
 use crate::diagnose::options::{DiagnoseOptions, EACH_LEVEL, MIN_VIEWS, measure_options};
-use crate::diagnose::steps::lattice::Quantisation;
+use crate::diagnose::steps::lattice::Step;
 use crate::diagnose::steps::{Steps, forget_windows, measure_steps};
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
@@ -36,7 +36,7 @@ pub struct Baseline {
     pub(in crate::diagnose) survey: Survey,
     pub(in crate::diagnose) structure: Vec<Structure>,
     pub(in crate::diagnose) textures: Vec<TextureFinding>,
-    pub(in crate::diagnose) lattice: Quantisation,
+    pub(in crate::diagnose) lattice: Option<Step>,
     /// Variance with a cause of its own: quantisation steps and row noise.
     pub steps: Steps,
     pub(in crate::diagnose) heavy: bool,
@@ -116,9 +116,9 @@ impl Baseline {
         survey.compare_frames(&fields, common(&structure, &textures, &none));
         let whitener = Whitener { sigma: None, terms: &[], survey: &survey, bench };
         measure_tails(&mut structure, &fields, &[], &whitener);
-        let steps = Steps::of(&lattice, &structure, &fields, simulated);
+        let steps = Steps::of(lattice, &structure, &fields, simulated);
         let mut unstepped = structure.clone();
-        forget_windows(&mut unstepped, &fields, &lattice, simulated);
+        forget_windows(&mut unstepped, &fields, lattice, simulated);
         let confusers = Confusers { simulated: true, ..Confusers::default() };
         Baseline {
             heavy: tails(&structure, &none, EACH_LEVEL * options.level, confusers).is_some(),

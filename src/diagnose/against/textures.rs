@@ -6,8 +6,8 @@ use crate::diagnose::noise::lagged::of_any_two_frames;
 use crate::diagnose::noise::structure::Structure;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::texture_findings;
-use crate::diagnose::steps::lattice::{Quantisation, Step};
-use crate::diagnose::steps::{KINDS, Kind};
+use crate::diagnose::steps::KINDS;
+use crate::diagnose::steps::lattice::Step;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::layers::Survey;
 use crate::stats::{mean, range};
@@ -18,12 +18,7 @@ const TAILS_ALIKE: f64 = 3.0;
 impl Baseline {
     /// Replaces each statistic of the real views by its difference from the twin's plus the mean over the
     /// simulated recording, which goes to `known`.
-    pub fn compare(
-        &self,
-        structure: &mut [Structure],
-        real: &Quantisation,
-        known: &mut KnownTerms,
-    ) {
+    pub fn compare(&self, structure: &mut [Structure], real: Option<Step>, known: &mut KnownTerms) {
         let windows = self.level(|s| s.window_px.map(f64::ln));
         let fixed = self.level(|s| s.still.fixed_px2).max(0.0);
         let (rows, columns) = (self.level(|s| s.row_px2), self.level(|s| s.column_px2));
@@ -75,9 +70,9 @@ impl Baseline {
         let alike = |a: Option<Step>, b: Option<Step>| {
             a.zip(b).is_some_and(|(a, b)| (a.size / b.size).ln().abs() < STEPS_ALIKE)
         };
-        for Kind { id, parameter, of, .. } in KINDS {
-            if alike(of(&self.lattice), of(real)) {
-                known.learn(id, parameter, 0.0);
+        for kind in KINDS {
+            if alike(kind.of(self.lattice), kind.of(real)) {
+                known.learn(kind.id, kind.parameter, 0.0);
             }
         }
     }

@@ -66,7 +66,8 @@ impl Pairs {
             let mut sums = [(Sum::default(), 0.0); 2];
             for line in 0..count {
                 let pixels = (0..length).map(|k| at(line, k));
-                let products = along(pixels.clone().map(|i| f64::from(level[i])));
+                let values: Vec<f64> = pixels.clone().map(|i| f64::from(level[i])).collect();
+                let products = along(&values);
                 let leverage = plane.leverage_along(&level, pixels);
                 for (k, (sum, leverages)) in sums.iter_mut().enumerate() {
                     *sum = sum.and(products[k]);
@@ -124,50 +125,23 @@ impl Sum {
     }
 }
 
-/// Sums of a line's values and their numbers: of all, of the last two blocks, and of pairs in blocks that touch.
-#[derive(Default)]
-struct Blocks {
-    length: usize,
-    whole: [f64; 2],
-    before: [f64; 2],
-    block: [f64; 2],
-    close: [f64; 2],
-}
-
-impl Blocks {
-    fn add(&mut self, k: usize, r: f64) {
-        if k > 0 && k.is_multiple_of(self.length) {
-            self.end();
-        }
-        if r.is_finite() {
-            self.block[0] += r;
-            self.block[1] += 1.0;
-        }
-    }
-
-    fn end(&mut self) {
-        let (block, before) = (std::mem::take(&mut self.block), self.before);
-        for k in 0..2 {
-            self.whole[k] += block[k];
-            self.close[k] += block[k] * (block[k] + 2.0 * before[k]);
-        }
-        self.before = block;
-    }
-
-    fn apart(mut self) -> Sum {
-        self.end();
-        let [products, pairs] = [0, 1].map(|k| self.whole[k].powi(2) - self.close[k]);
-        Sum { products, pairs }
-    }
-}
-
 /// Sums over pairs of a line's pixels in blocks that do not touch, for either length of them.
-fn along(line: impl Iterator<Item = f64>) -> [Sum; 2] {
-    let mut all = BLOCKS_PX.map(|length| Blocks { length, ..Blocks::default() });
-    for (k, r) in line.enumerate() {
-        all.iter_mut().for_each(|blocks| blocks.add(k, r));
-    }
-    all.map(Blocks::apart)
+fn along(line: &[f64]) -> [Sum; 2] {
+    BLOCKS_PX.map(|length| {
+        // Sums and numbers: of all, of the pairs in blocks that touch, and of the block before.
+        let [mut whole, mut close, mut before] = [[0.0; 2]; 3];
+        for block in line.chunks(length) {
+            let seen = block.iter().filter(|r| r.is_finite());
+            let block = seen.fold([0.0; 2], |[sum, count], r| [sum + r, count + 1.0]);
+            for k in 0..2 {
+                whole[k] += block[k];
+                close[k] += block[k] * (block[k] + 2.0 * before[k]);
+            }
+            before = block;
+        }
+        let [products, pairs] = [0, 1].map(|k: usize| whole[k].powi(2) - close[k]);
+        Sum { products, pairs }
+    })
 }
 
 /// Sums over pairs within `reach` of each other, by box sums.
@@ -219,8 +193,8 @@ impl Plane {
         for k in 0..3 {
             let whitened = |i: usize| (self.whitening * self.columns(i))[k];
             let seen = |i: usize| if image[i].is_finite() { whitened(i) } else { f64::NAN };
-            let sums = along(line.clone().map(seen));
-            all.iter_mut().zip(sums).for_each(|(all, sum)| *all += sum.products);
+            let values: Vec<f64> = line.clone().map(seen).collect();
+            all.iter_mut().zip(along(&values)).for_each(|(all, sum)| *all += sum.products);
         }
         all
     }

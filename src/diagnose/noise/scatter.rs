@@ -35,8 +35,8 @@ impl Case<'_> {
         let camera = &self.recording.sensor.camera;
         let mut structure = structures(&self.fields, &mean.px, &self.kept);
         let lattice = self.lattice;
-        let own = Steps::of(&lattice, &structure, &self.fields, self.recording);
-        forget_windows(&mut structure, &self.fields, &lattice, self.recording);
+        let own = Steps::of(lattice, &structure, &self.fields, self.recording);
+        forget_windows(&mut structure, &self.fields, lattice, self.recording);
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(EACH_LEVEL);
@@ -150,7 +150,7 @@ impl Case<'_> {
             let parts = NoiseParts::of(structure, &baseline.structure, each);
             shrunk = parts.as_ref().is_some_and(NoiseParts::shrink_alike);
             of_parts = baseline.noise_findings(parts.as_ref(), structure, &self.fields, each);
-            baseline.compare(structure, &self.lattice, &mut self.known);
+            baseline.compare(structure, self.lattice, &mut self.known);
             if let Some(found) = found {
                 // The extended model already has it, by name or in the size of the noise.
                 let held = |h: &TextureFinding| {

@@ -21,18 +21,11 @@ impl Default for RawHistogram {
 /// A step that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
+    /// Of the depth, m, or else of the disparity, px.
+    pub is_of_depth: bool,
     pub size: f64,
     /// P-value if all words were equally likely to occur; `None` where the format itself has the steps.
     pub p: Option<f64>,
-}
-
-/// Steps that were found.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Quantisation {
-    /// Depth step, m: all words are multiples of so many units.
-    pub depth: Option<Step>,
-    /// Disparity step, px: occurring disparities are multiples of it, plus a constant.
-    pub disparity: Option<Step>,
 }
 
 /// Fewest distinct words for phases to show a lattice.
@@ -51,15 +44,10 @@ const COARSEST_PX: f64 = 8.0;
 /// A step of which a comb is a fraction is at least twice as coarse.
 const COARSER: f64 = 1.5;
 
-impl Quantisation {
-    pub fn is_some(&self) -> bool {
-        self.depth.is_some() || self.disparity.is_some()
-    }
-
-    /// Coarser of the two steps at this depth, px.
-    pub fn step_px(&self, scale_px_m: f64, z: f64) -> f64 {
-        let depth = self.depth.map_or(0.0, |step| step.size * scale_px_m / (z * z));
-        self.disparity.map_or(0.0, |step| step.size).max(depth)
+impl Step {
+    /// Its size at this depth, px.
+    pub fn px(&self, scale_px_m: f64, z: f64) -> f64 {
+        if self.is_of_depth { self.size * scale_px_m / (z * z) } else { self.size }
     }
 }
 
@@ -87,8 +75,8 @@ impl RawHistogram {
         self.0.iter().filter(|n| **n > 0).take(MIN_WORDS).count() < MIN_WORDS
     }
 
-    /// Returns the lattice that the words lie on.
-    pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Quantisation {
+    /// Step of the lattice that the words lie on.
+    pub fn lattice(&self, sensor: &Sensor, scale_px_m: f64) -> Option<Step> {
         match sensor.code {
             DepthCode::Metric { units_per_metre, .. } => {
                 self.of_depths(units_per_metre, scale_px_m)
@@ -98,16 +86,13 @@ impl RawHistogram {
         }
     }
 
-    fn of_depths(&self, units_per_metre: f64, scale_px_m: f64) -> Quantisation {
+    fn of_depths(&self, units_per_metre: f64, scale_px_m: f64) -> Option<Step> {
         let words = self.occurring();
         let of_depth = |(units, p)| {
-            let depth = Some(Step { size: units / units_per_metre, p: Some(p) });
-            Quantisation { depth, disparity: None }
+            let size = units / units_per_metre;
+            Some(Step { is_of_depth: true, size, p: Some(p) })
         };
-        let of_disparity = |(size, p)| {
-            let disparity = Some(Step { size, p: Some(p) });
-            Quantisation { depth: None, disparity }
-        };
+        let of_disparity = |(size, p)| Some(Step { is_of_depth: false, size, p: Some(p) });
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, *w));
         let by_chance = all_multiples(stride, words.len());
         let few = words.len() < MIN_WORDS;
@@ -118,7 +103,7 @@ impl RawHistogram {
             return of_depth((stride as f64, by_chance));
         }
         if words.is_empty() || self.contrast(&words) < CONTRAST {
-            return Quantisation::default();
+            return None;
         }
         let px_words = scale_px_m * units_per_metre;
         let (disparity, depth) = if few {
@@ -144,19 +129,18 @@ impl RawHistogram {
             (Some(px), _) => of_disparity(px),
             (None, Some(units)) => of_depth(units),
             (None, None) => {
-                let told = if depth.resultant > disparity.resultant {
-                    depth.step().map(|units| of_depth((units, depth.p)))
+                if depth.resultant > disparity.resultant {
+                    of_depth((depth.step()?, depth.p))
                 } else {
-                    disparity.step().map(|size| of_disparity((size, disparity.p)))
-                };
-                told.unwrap_or_default()
+                    of_disparity((disparity.step()?, disparity.p))
+                }
             }
         }
     }
 
-    fn of_raw_words(&self, word_px: f64) -> Quantisation {
+    fn of_raw_words(&self, word_px: f64) -> Option<Step> {
         let words = self.occurring();
-        let Some(first) = words.first() else { return Quantisation::default() };
+        let first = words.first()?;
         let few = words.len() < MIN_WORDS;
         let stride = words.iter().fold(0, |g, (w, _)| gcd(g, w - first.0));
         let coarser = if stride > 1 {
@@ -166,11 +150,10 @@ impl RawHistogram {
         };
         let coarser = coarser.filter(|c| !few || c.1 < CHANCE);
         if few && coarser.is_none() {
-            return Quantisation::default();
+            return None;
         }
         let size = coarser.map_or(1.0, |c| c.0) * word_px;
-        let disparity = Some(Step { size, p: coarser.map(|c| c.1) });
-        Quantisation { depth: None, disparity }
+        Some(Step { is_of_depth: false, size, p: coarser.map(|c| c.1) })
     }
 
     /// Whether the disparities lie on a lattice of this step, allowing for a scale or the step's own error.
@@ -282,28 +265,29 @@ mod tests {
         };
         for step_px in [0.16, 0.2, 0.25, 1.0 / 3.0, 0.5, 0.9125, 1.2125, 1.675] {
             let found = found(step_px);
-            let step = found.disparity.expect("a step");
-            assert!((step.size / step_px - 1.0).abs() < 5e-3, "{step_px}: {found:?}");
-            assert!(step.p.is_some_and(|p| p < 1e-4), "{found:?}");
+            let step = found.expect("a step");
+            let near = (step.size / step_px - 1.0).abs() < 5e-3;
+            assert!(near && !step.is_of_depth, "{step_px}: {step:?}");
+            assert!(step.p.is_some_and(|p| p < 1e-4), "{step:?}");
         }
-        let own = found(0.0).disparity.unwrap();
+        let own = found(0.0).unwrap();
         assert!((own.size / word_px - 1.0).abs() < 1e-9 && own.p.is_none(), "{own:?}");
     }
 
     #[test]
     fn steps_of_matcher_and_driver_are_found_and_none_where_there_are_none() {
         let sensor = kinect_v1(1);
-        let found = words(0.125, 0.0).lattice(&sensor, 43.5);
-        assert!((found.disparity.unwrap().size / 0.125 - 1.0).abs() < 2e-3, "{found:?}");
-        let found = words(0.0, 0.001).lattice(&sensor, 43.5);
-        assert_eq!((found.depth.map(|step| step.size), found.disparity), (Some(0.001), None));
+        let found = words(0.125, 0.0).lattice(&sensor, 43.5).unwrap();
+        assert!((found.size / 0.125 - 1.0).abs() < 2e-3 && !found.is_of_depth, "{found:?}");
+        let found = words(0.0, 0.001).lattice(&sensor, 43.5).unwrap();
+        assert_eq!((found.size, found.is_of_depth), (0.001, true));
         for rounding in [0.00045, 0.000907, 0.00121, 0.0123] {
             let found = words(0.0, rounding).lattice(&sensor, 43.5);
-            let step = found.depth.expect("a step that is no whole number of units");
-            assert!((step.size / rounding - 1.0).abs() < 1e-4, "{rounding}: {found:?}");
-            assert!(found.disparity.is_none() && step.p.is_some_and(|p| p < 1e-9));
+            let step = found.expect("a step that is no whole number of units");
+            assert!((step.size / rounding - 1.0).abs() < 1e-4, "{rounding}: {step:?}");
+            assert!(step.is_of_depth && step.p.is_some_and(|p| p < 1e-9));
         }
-        assert_eq!(words(0.0, 0.0).lattice(&sensor, 43.5), Quantisation::default());
+        assert_eq!(words(0.0, 0.0).lattice(&sensor, 43.5), None);
     }
 
     /// Targets at a few words, one of which was decided by chance in the rounding to 0.2 mm.
@@ -316,7 +300,7 @@ mod tests {
         let readings = words.iter().zip(counts);
         histogram.count(readings.flat_map(|(word, n)| std::iter::repeat_n(*word, 1000 * n)));
         assert!(histogram.is_few());
-        let found = histogram.lattice(&sensor, 21.75).disparity.expect("a step");
-        assert!((found.size / 2.0 - 1.0).abs() < 1e-3, "{found:?}");
+        let found = histogram.lattice(&sensor, 21.75).expect("a step");
+        assert!((found.size / 2.0 - 1.0).abs() < 1e-3 && !found.is_of_depth, "{found:?}");
     }
 }

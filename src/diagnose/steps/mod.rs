@@ -16,7 +16,7 @@ use crate::diagnose::views::known::KnownTerms;
 use crate::frame::DepthCode;
 use crate::terms::{Axis, PixelContext, Statistic};
 use crate::view::Recording;
-use lattice::{Quantisation, RawHistogram, Step};
+use lattice::{RawHistogram, Step};
 
 /// Variance with other causes than sigma: quantisation steps, rows, and pixels.
 #[derive(Debug, Clone, Copy)]
@@ -28,12 +28,13 @@ pub struct Steps {
 
 impl Steps {
     pub fn of(
-        lattice: &Quantisation,
+        step: Option<Step>,
         structure: &[Structure],
         fields: &[Field],
         recording: &Recording,
     ) -> Self {
-        let step_px = lattice.disparity.map_or(0.0, |step| step.size);
+        let size = |of_depth| step.filter(|s| s.is_of_depth == of_depth).map_or(0.0, |s| s.size);
+        let step_px = size(false);
         let own_px = word_px(recording, fields[0].scale_px_m).unwrap_or(0.0);
         let words = step_px / own_px;
         let whole = own_px > 0.0 && (words.round() / words - 1.0).abs() < SAME_STEP;
@@ -41,7 +42,7 @@ impl Steps {
         let single = fields.iter().all(|f| f.frames.len() < 2);
         let still = if single { fixed_px2(structure) } else { 0.0 };
         Steps {
-            depth_px_m2: lattice.depth.map_or(0.0, |step| step.size) * fields[0].scale_px_m,
+            depth_px_m2: size(true) * fields[0].scale_px_m,
             // The model's variance already includes the words of a raw sensor. A step that is no whole number
             // of words is rounded twice.
             disparity_px: if whole {
@@ -60,22 +61,22 @@ impl Steps {
     }
 }
 
-/// Finds the steps of the stored words, and what they are at each target.
+/// Finds the step of the stored words, and what it is at each target.
 pub(in crate::diagnose) fn measure_steps(
     fields: &mut [Field],
     recording: &Recording,
     rays: &Rays,
-) -> Quantisation {
+) -> Option<Step> {
     let found = lattice(&*fields, recording);
     for f in fields.iter_mut().filter(|f| !f.pixels.is_empty()) {
         let z = f.scale_px_m / f.disparity(f.pixels.len() / 2, rays);
         let word_px = f.scale_px_m * recording.sensor.code.step_inverse(z);
-        f.step_px = found.step_px(f.scale_px_m, z).max(word_px);
+        f.step_px = found.map_or(0.0, |step| step.px(f.scale_px_m, z)).max(word_px);
     }
     found
 }
 
-fn lattice<'a>(fields: impl IntoIterator<Item = &'a Field>, recording: &Recording) -> Quantisation {
+fn lattice<'a>(fields: impl IntoIterator<Item = &'a Field>, recording: &Recording) -> Option<Step> {
     let (mut words, mut pictures) = (RawHistogram::default(), RawHistogram::default());
     let mut scale_px_m = 0.0;
     for f in fields {
@@ -96,16 +97,30 @@ fn word_px(recording: &Recording, px_m: f64) -> Option<f64> {
 
 /// Relative difference below which the steps of two halves are equal: twice the scan's own error.
 const SAME_STEP: f64 = 0.005;
+/// Relative standard error of a step that was scanned for.
+const SCANNED: f64 = 0.002;
+
+/// Standard error of a step. A whole number of units has none: it is the greatest that divides all words.
+fn error(step: Step, code: &DepthCode) -> f64 {
+    let units = match code {
+        DepthCode::Metric { units_per_metre, .. } if step.is_of_depth => {
+            step.size * units_per_metre
+        }
+        _ => f64::NAN,
+    };
+    if (units - units.round()).abs() < 1e-9 * units { 0.0 } else { SCANNED * step.size }
+}
 
 /// Step of a raw recording's own words, px, if that is the step found. A simulation in the same words has it
 /// too, and sigma includes its error.
 pub(in crate::diagnose) fn own_step(
-    lattice: &Quantisation,
+    step: Option<Step>,
     recording: &Recording,
     px_m: f64,
 ) -> Option<f64> {
     let word = word_px(recording, px_m)?;
-    lattice.disparity.map(|step| step.size).filter(|step| (step / word - 1.0).abs() < SAME_STEP)
+    let sizes = step.filter(|s| !s.is_of_depth).map(|s| s.size);
+    sizes.filter(|size| (size / word - 1.0).abs() < SAME_STEP)
 }
 
 pub(in crate::diagnose) fn own_step_note(step: f64) -> String {
@@ -124,16 +139,16 @@ pub(in crate::diagnose) const COARSE_SIGMAS: f64 = 2.0;
 pub(in crate::diagnose) fn forget_windows(
     structure: &mut [Structure],
     fields: &[Field],
-    lattice: &Quantisation,
+    step: Option<Step>,
     recording: &Recording,
 ) {
-    if own_step(lattice, recording, fields[0].scale_px_m).is_some() {
+    let Some(step) = step else { return };
+    if own_step(Some(step), recording, fields[0].scale_px_m).is_some() {
         return;
     }
     for (s, f) in structure.iter_mut().zip(fields) {
         let sigma = f.middle_sigma_px().map_or(0.0, f64::from);
-        let step = lattice.step_px(f.scale_px_m, f.plane.depth(0.0, 0.0));
-        if step > COARSE_SIGMAS * sigma {
+        if step.px(f.scale_px_m, f.plane.depth(0.0, 0.0)) > COARSE_SIGMAS * sigma {
             (s.window_px, s.neighbour_correlation, s.correlation_profile) = (None, None, None);
             (s.row_px2, s.column_px2) = (None, None);
         }
@@ -145,30 +160,11 @@ pub(in crate::diagnose) struct Kind {
     pub id: &'static str,
     pub parameter: &'static str,
     axis: Axis,
-    pub of: fn(&Quantisation) -> Option<Step>,
-    /// Size of a step in the middle of a view, px.
-    px: fn(f64, &Field) -> f64,
-    /// Relative standard error of a step that is found.
-    error: f64,
 }
 
 pub(in crate::diagnose) const KINDS: [Kind; 2] = [
-    Kind {
-        id: "disparity-quantisation",
-        parameter: "step_px",
-        axis: Axis::DisparityPhase,
-        of: |lattice| lattice.disparity,
-        px: |step, _| step,
-        error: 0.002,
-    },
-    Kind {
-        id: "depth-rounding",
-        parameter: "step_m",
-        axis: Axis::Z,
-        of: |lattice| lattice.depth,
-        px: |step, f| step * f.scale_px_m / f.plane.depth(0.0, 0.0).powi(2),
-        error: 0.0,
-    },
+    Kind { id: "disparity-quantisation", parameter: "step_px", axis: Axis::DisparityPhase },
+    Kind { id: "depth-rounding", parameter: "step_m", axis: Axis::Z },
 ];
 
 impl Kind {
@@ -176,11 +172,17 @@ impl Kind {
         self.axis == Axis::Z
     }
 
+    /// The step, if it is of this kind.
+    pub fn of(&self, step: Option<Step>) -> Option<Step> {
+        step.filter(|step| step.is_of_depth == self.is_of_depth())
+    }
+
     /// Variance that a step adds in each view, as a share of the noise variance.
-    fn added(&self, step: f64, fields: &[Field]) -> impl Iterator<Item = f64> {
+    fn added(&self, size: f64, fields: &[Field]) -> impl Iterator<Item = f64> {
+        let step = Step { is_of_depth: self.is_of_depth(), size, p: None };
         fields.iter().map(move |f| {
             let sigma = f.middle_sigma_px().map_or(f64::INFINITY, f64::from);
-            ((self.px)(step, f) / sigma).powi(2) / 12.0
+            (step.px(f.scale_px_m, f.plane.depth(0.0, 0.0)) / sigma).powi(2) / 12.0
         })
     }
 
@@ -233,29 +235,29 @@ pub(in crate::diagnose) fn contradicted(
 }
 
 pub(in crate::diagnose) fn steps(
-    lattice: &Quantisation,
+    step: Option<Step>,
     known: &KnownTerms,
     fields: &[Field],
     recording: &Recording,
     second: &[bool],
 ) -> Vec<Finding> {
     let disparity_counts = recording.sensor.may_have_disparity()
-        && own_step(lattice, recording, fields[0].scale_px_m).is_none();
+        && own_step(step, recording, fields[0].scale_px_m).is_none();
     let found = |kind: &Kind| {
-        let step = (kind.of)(lattice).filter(|_| disparity_counts || kind.is_of_depth())?;
+        let step = kind.of(step).filter(|_| disparity_counts || kind.is_of_depth())?;
         let strongest = kind.added(step.size, fields).fold(0.0, f64::max).sqrt();
         if known.has(kind.id) || strongest <= STEP_SHARE {
             return None;
         }
         let halves = [false, true].map(|half| {
             let mine = fields.iter().zip(second).filter(|(_, s)| **s == half);
-            (kind.of)(&self::lattice(mine.map(|(f, _)| f), recording))
+            kind.of(lattice(mine.map(|(f, _)| f), recording))
         });
         let same = |a: Step, b: Step| (a.size / b.size - 1.0).abs() < SAME_STEP;
         let depths = || crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));
         Some(Finding {
             interval: if kind.is_of_depth() { depths() } else { [0.0, 1.0] },
-            parameters: one(kind.parameter, step.size, kind.error * step.size),
+            parameters: one(kind.parameter, step.size, error(step, &recording.sensor.code)),
             p_adjusted: step.p,
             replicated: Some(halves[0].zip(halves[1]).is_some_and(|(a, b)| same(a, b))),
             ..kind.finding(step.size, fields)

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::lattice::Quantisation;
+use super::lattice::Step;
 use crate::diagnose::views::field::Field;
 use crate::stats::mean;
 use crate::terms::{GroupMean, PixelContext};
@@ -14,10 +14,7 @@ use crate::terms::{GroupMean, PixelContext};
 /// exp(-2 (pi k r)^2) steps (Widrow and Kollar, Quantization Noise, 2008). Two waves are all of it but for
 /// steps beyond four sigmas.
 #[derive(Debug, Clone, Copy)]
-pub struct Rounding {
-    step: f64,
-    is_of_depth: bool,
-}
+pub struct Rounding(Step);
 
 /// Amplitude that no view shows, in sigmas: a hundredth of the error of a mean over ten thousand readings.
 const UNSEEN: f64 = 1e-4;
@@ -28,14 +25,10 @@ impl Rounding {
 
     /// `None` where noise hides the steps everywhere.
     pub fn of<'a>(
-        lattice: &Quantisation,
+        step: Option<Step>,
         places: impl IntoIterator<Item = &'a PixelContext>,
     ) -> Option<Self> {
-        let rounding = match (lattice.disparity, lattice.depth) {
-            (Some(step), _) => Rounding { step: step.size, is_of_depth: false },
-            (None, Some(step)) => Rounding { step: step.size, is_of_depth: true },
-            (None, None) => return None,
-        };
+        let rounding = Rounding(step?);
         let shows = |p: &PixelContext| {
             let step_px = rounding.step_px(p);
             step_px * wave(1.0, noise(step_px, p.variance)) > UNSEEN * p.variance.sqrt()
@@ -84,15 +77,15 @@ impl Rounding {
 
     /// Sine and cosine of wave `k`, averaged over the pixels of a patch.
     fn phases(&self, k: f64, p: &PixelContext) -> [f64; 2] {
-        let place = if self.is_of_depth { p.z } else { p.disparity };
-        let (sin, cos) = (k * TAU * place / self.step).sin_cos();
+        let place = if self.0.is_of_depth { p.z } else { p.disparity };
+        let (sin, cos) = (k * TAU * place / self.0.size).sin_cos();
         let along = |slope: &f64| averaged(k * slope / self.step_px(p), p.side);
         let kept: f64 = p.slope.iter().map(along).product();
         [kept * sin, kept * cos]
     }
 
     fn step_px(&self, p: &PixelContext) -> f64 {
-        if self.is_of_depth { self.step * p.disparity / p.z } else { self.step }
+        self.0.px(p.disparity * p.z, p.z)
     }
 }
 
@@ -135,12 +128,11 @@ fn averaged(frequency: f64, side: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::steps::lattice::Step;
 
     const STEP: f64 = 0.13;
 
-    fn rounding(size: f64) -> Quantisation {
-        Quantisation { disparity: Some(Step { size, p: None }), depth: None }
+    fn rounding(size: f64) -> Option<Step> {
+        Some(Step { is_of_depth: false, size, p: None })
     }
 
     /// A pixel's place `x` steps from the sensor, with noise of `r` steps before it is rounded.
@@ -180,7 +172,7 @@ mod tests {
     fn waves_are_those_of_rounded_noise() {
         const PHASES: usize = 40;
         for r in [0.25, 0.3, 0.35, 0.45] {
-            let known = Rounding::of(&rounding(STEP), &[place(0.0, r)]).expect("steps that show");
+            let known = Rounding::of(rounding(STEP), &[place(0.0, r)]).expect("steps that show");
             let phase = |k: usize| 7.0 + (k as f64 + 0.5) / PHASES as f64;
             let places: Vec<PixelContext> = (0..PHASES).map(|k| place(phase(k), r)).collect();
             let truth: Vec<[f64; 2]> = (0..PHASES).map(|k| rounded(phase(k), r)).collect();
@@ -212,7 +204,7 @@ mod tests {
                 side,
                 ..place(308.0 + more / STEP, 0.3)
             };
-            let known = Rounding::of(&rounding(STEP), &[at(0.0, 1.0)]).expect("steps that show");
+            let known = Rounding::of(rounding(STEP), &[at(0.0, 1.0)]).expect("steps that show");
             let pixel = |k: usize| known.of_mean(&at(slope * (k as f64 - 0.5 * (side - 1.0)), 1.0));
             let patch = known.of_mean(&at(0.0, side));
             for (k, whole) in patch.into_iter().enumerate() {
@@ -225,7 +217,7 @@ mod tests {
     #[test]
     fn fine_steps_leave_nothing() {
         let fine = place(0.0, 3.0);
-        assert!(Rounding::of(&rounding(STEP), &[fine]).is_none());
-        assert!(Rounding::of(&Quantisation::default(), &[place(0.0, 0.3)]).is_none());
+        assert!(Rounding::of(rounding(STEP), &[fine]).is_none());
+        assert!(Rounding::of(None, &[place(0.0, 0.3)]).is_none());
     }
 }
