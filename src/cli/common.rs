@@ -113,12 +113,9 @@ impl Input {
 
     /// Fails if an option is given that has no meaning for a live Kinect, which sends its own raw disparities.
     pub fn refuse_for_kinect(&self) -> anyhow::Result<()> {
-        let given = [
-            (self.units_per_metre.is_some(), "--units-per-metre"),
-            (self.sensor.is_some(), "--sensor"),
-            (self.topic.is_some(), "--topic"),
-        ];
-        if let Some((_, name)) = given.iter().find(|(given, _)| *given) {
+        let given = self.again();
+        let is_given = |name: &&&str| given.iter().any(|word| word == **name);
+        if let Some(name) = ["--units-per-metre", "--sensor", "--topic"].iter().find(is_given) {
             bail!(
                 "{name} does not belong to --source freenect: a Kinect sends raw disparities; --raw-disparity says what they mean"
             );

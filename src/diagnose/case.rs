@@ -13,7 +13,6 @@ use super::search::outcome::Outcome;
 use super::search::rules::LATER_LEVEL;
 use super::steps::lattice::Step;
 use super::steps::measure_steps;
-use super::steps::rounding::Rounding;
 use super::views::column_steps::column_steps;
 use super::views::field::Field;
 use super::views::known::KnownTerms;
@@ -244,8 +243,7 @@ fn survey(
     (learnt_from, known): ([Option<Learnt>; 2], &KnownTerms),
     model: &NoiseModel,
 ) -> Survey {
-    let mut survey = Survey::of(fields, bench);
-    survey.rounding = Rounding::of(lattice, survey.views.iter().flat_map(|v| v.places.iter()));
+    let mut survey = Survey::of(fields, bench, lattice);
     survey.ablate(options.ablation, fields);
     survey.refits_sigma = options.calibrated_here && baseline.is_none();
     let still = still(&beside_bias(fields, &[]), kept);

@@ -108,7 +108,7 @@ impl Baseline {
     ) -> Self {
         let lattice = measure_steps(&mut fields, simulated, &bench.rays);
         let none = KnownTerms::default();
-        let mut survey = Survey::of(&fields, bench);
+        let mut survey = Survey::of(&fields, bench, lattice);
         survey.compared();
         let kept = KeptPattern::of(&fields);
         let mut structure = structures(&fields, &[], &kept);

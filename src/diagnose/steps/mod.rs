@@ -119,8 +119,8 @@ pub(in crate::diagnose) fn own_step(
     px_m: f64,
 ) -> Option<f64> {
     let word = word_px(recording, px_m)?;
-    let sizes = step.filter(|s| !s.is_of_depth).map(|s| s.size);
-    sizes.filter(|size| (size / word - 1.0).abs() < SAME_STEP)
+    let size = step.filter(|s| !s.is_of_depth)?.size;
+    ((size / word - 1.0).abs() < SAME_STEP).then_some(size)
 }
 
 pub(in crate::diagnose) fn own_step_note(step: f64) -> String {

@@ -15,6 +15,7 @@ use crate::diagnose::checks::replication::halves;
 use crate::diagnose::noise::lagged::of_any_two_frames;
 use crate::diagnose::options::Ablation;
 use crate::diagnose::search::view_levels::{MODEL_TOLERANCE, view_scatter};
+use crate::diagnose::steps::lattice::Step;
 use crate::diagnose::steps::rounding::Rounding;
 use crate::effects::Flat;
 use crate::measure::Workbench;
@@ -78,7 +79,8 @@ fn inflations(fields: &[Field], bias: &[Vec<f32>]) -> Vec<(f64, Correlation)> {
 }
 
 impl Survey {
-    pub fn of(fields: &[Field], bench: &Workbench<'_>) -> Self {
+    /// `step` is that of the stored words.
+    pub fn of(fields: &[Field], bench: &Workbench<'_>, step: Option<Step>) -> Self {
         let camera = &bench.sensor.camera;
         let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
         let poses: Vec<(f64, f64)> =
@@ -114,6 +116,7 @@ impl Survey {
         });
         Survey {
             block_tiles: block_tiles(&views, camera.width),
+            rounding: Rounding::of(step, views.iter().flat_map(|v| v.places.iter())),
             views,
             reach,
             flat,
@@ -125,7 +128,6 @@ impl Survey {
             refits_sigma: false,
             learnt_from: [None; 2],
             between: Arc::default(),
-            rounding: None,
             ablation: Ablation::None,
         }
     }
