@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::camera::Camera;
 use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::outcome::Chosen;
-use crate::diagnose::search::prepared::fill_all;
+use crate::diagnose::search::prepared::{append_all, fill_all};
+use crate::diagnose::search::rows::Entries;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
 
@@ -16,8 +17,6 @@ const RIDGE: f64 = 0.1;
 const HELD: f64 = 1e4;
 /// Pixels per map node.
 const NODE_PX: usize = 32;
-/// Number of a map's splines that are nonzero at a place.
-const SPLINES: usize = 16;
 
 /// Columns of the fit: the terms', then the maps' nodes.
 pub struct Columns {
@@ -26,8 +25,6 @@ pub struct Columns {
     pub precision: DVector<f64>,
     pub gauges: Vec<Option<Gauge>>,
     pub maps: [Basis; 2],
-    /// Map nodes per row.
-    across: usize,
     /// The part of the second map that planes absorb.
     pub far_gauge: Option<Gauge>,
     /// Modulations of the affine parts that are subtracted, each once.
@@ -75,7 +72,6 @@ impl Columns {
             nodes,
             precision: DVector::from_vec(chosen.iter().flat_map(precision).collect()),
             bases,
-            across,
             far_gauge: Gauge::of(&maps[1], &pixels),
             maps,
         }
@@ -101,16 +97,12 @@ impl Columns {
     /// are zero at any one sample.
     fn add(&self, view: &ViewData, sum: &mut Evidence) {
         let Some(rows) = view.rows(&view.response) else { return };
-        let first = |i: usize| {
+        let cell = |i: usize| {
             let mut first = usize::MAX;
             self.maps[0].visit(&view.places[i], |node, _| first = first.min(node));
             first
         };
-        let touched = |first| self.touched(first).collect();
-        let fill = |i: usize, row: &mut [f64]| {
-            self.fill_touched(&view.places[i], row);
-        };
-        rows.add_by_blocks(sum, first, touched, fill);
+        rows.add_by_blocks(sum, cell, |i, row| self.append(&view.places[i], row));
     }
 
     /// Score that a fit leaves in a view, its plane profiled out: b - A beta of its normal equations,
@@ -118,37 +110,16 @@ impl Columns {
     pub fn left(&self, view: &ViewData, beta: &DVector<f64>) -> Option<DVector<f64>> {
         let affine = -(&self.absorbed * beta);
         let beta: Vec<f64> = beta.iter().chain(&affine).copied().collect();
-        let (n, p) = (beta.len(), view.precision.len());
-        let mut own = DMatrix::from_diagonal(&DVector::from_column_slice(&view.precision));
-        // Products of each column with the nuisances and with the residual.
-        let mut products = vec![0.0; n * (p + 1)];
-        let mut seen = DVector::zeros(p);
-        let mut row = vec![0.0; self.terms + 2 * SPLINES + self.absorbed.nrows()];
-        let mut touched: (usize, Vec<usize>) = (usize::MAX, Vec::new());
-        let samples = view.places.iter().zip(&view.response).zip(&view.weight);
-        let samples = samples.zip(view.nuisance.chunks_exact(p)).filter(|((_, w), _)| **w > 0.0);
-        for (((place, y), w), nuisances) in samples {
-            let first = self.fill_touched(place, &mut row);
-            if first != touched.0 {
-                touched = (first, self.touched(first).collect());
-            }
-            let columns = || touched.1.iter().zip(&row).filter(|(_, g)| **g != 0.0);
-            let beyond = w * (y - columns().map(|(&k, g)| g * beta[k]).sum::<f64>());
-            let weighted: Vec<f64> = nuisances.iter().map(|x| w * x).chain([beyond]).collect();
-            for (&k, g) in columns() {
-                let into = &mut products[k * (p + 1)..][..p + 1];
-                into.iter_mut().zip(&weighted).for_each(|(sum, x)| *sum += g * x);
-            }
-            let x = DVector::from_column_slice(nuisances);
-            own.ger(*w, &x, &x, 1.0);
-            seen.axpy(beyond, &x, 1.0);
-        }
-        let plane: DVector<f64> = own.try_inverse()? * seen;
-        let left = |products: &[f64]| {
-            let explained = products.iter().zip(&plane).map(|(s, f)| s * f).sum::<f64>();
-            products[p] - explained
+        let mut row = Entries::new();
+        let mut residual = |(place, y): (&PixelContext, &f64)| {
+            row.clear();
+            self.append(place, &mut row);
+            y - row.iter().map(|&(k, g)| g * beta[k]).sum::<f64>()
         };
-        let left = DVector::from_iterator(n, products.chunks_exact(p + 1).map(left));
+        let residuals: Vec<f64> =
+            view.places.iter().zip(&view.response).map(&mut residual).collect();
+        let rows = view.rows(&residuals)?;
+        let left = rows.scores_on(beta.len(), |i, row| self.append(&view.places[i], row));
         let (n, m) = (self.absorbed.ncols(), self.absorbed.nrows());
         Some(left.rows(0, n) - self.absorbed.transpose() * left.rows(n, m))
     }
@@ -158,34 +129,13 @@ impl Columns {
         self.absorbed.ncols() + self.absorbed.nrows()
     }
 
-    /// Columns that may be nonzero where the maps' splines begin at node `first`.
-    fn touched(&self, first: usize) -> impl Iterator<Item = usize> {
-        let half = self.nodes / 2;
-        let squares = (0..SPLINES).map(|k| k / 4 * self.across + k % 4);
-        let nodes = squares.map(move |node| self.terms + first + node);
-        let affine = self.absorbed.ncols()..self.width();
-        let maps = nodes.clone().chain(nodes.map(move |node| node + half));
-        (0..self.terms).chain(maps).chain(affine)
-    }
-
-    /// Fills these columns at a place, affine parts included, and returns the first node.
-    fn fill_touched(&self, place: &PixelContext, row: &mut [f64]) -> usize {
-        let (terms, others) = row.split_at_mut(self.terms);
-        let (nodes, affine) = others.split_at_mut(2 * SPLINES);
-        fill_all(&self.bases, place, terms);
-        let mut begins = 0;
-        for (map, nodes) in self.maps.iter().zip(nodes.chunks_exact_mut(SPLINES)) {
-            let mut k = 0;
-            map.visit(place, |node, value| {
-                begins = if k == 0 { node } else { begins };
-                nodes[k] = value;
-                k += 1;
-            });
+    /// Appends the columns that may be nonzero at a place, affine parts included.
+    fn append(&self, place: &PixelContext, row: &mut Entries) {
+        append_all(&self.bases, place, 0, row);
+        append_all(&self.maps, place, self.terms, row);
+        for (k, &times) in self.absorbed_times.iter().enumerate() {
+            append_all(&[Basis::Affine { times }], place, self.absorbed.ncols() + 3 * k, row);
         }
-        for (&times, affine) in self.absorbed_times.iter().zip(affine.chunks_exact_mut(3)) {
-            Basis::Affine { times }.fill(place, affine);
-        }
-        begins
     }
 
     /// Fills all columns at a place, the terms without what planes absorb of them.

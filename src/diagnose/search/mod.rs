@@ -38,7 +38,8 @@ use choose::Choice;
 use evidence::{Evidence, fit, gain};
 use layer_null::{Group, LayerNull};
 use outcome::{Chosen, Look, Outcome, bases, bases_where};
-use prepared::{Grouping, Patches, Prepared, Together, prepare};
+use prepared::{Grouping, Patches, Prepared, Together, merged, prepare};
+use rows::Rows;
 use rules::Rules;
 use trial::{Judged, Trial, looks, nests};
 
@@ -230,18 +231,45 @@ impl<'a> Layer<'a> {
         let rules = self.rules.beside(chosen.len());
         let mut next =
             Choice { candidates, judged: &judged, rules: &rules, noise }.best(&beside)?;
-        period::tune(candidates, chosen, &mut next, |terms| self.total(terms));
+        if let Some(reach) = period::neighbours(candidates, &next.candidate) {
+            let basis = next.candidate.basis.clone();
+            period::tune(reach, &mut next, self.total_beside(chosen, &basis));
+        }
         Some(next)
+    }
+
+    fn pinned(&self) -> Vec<&Basis> {
+        self.pinned.iter().map(|c| &c.candidate.basis).collect()
     }
 
     /// Joint gain of `terms`, given the pinned term.
     fn total(&self, terms: &[&Basis]) -> f64 {
-        let pinned: Vec<&Basis> = self.pinned.iter().map(|c| &c.candidate.basis).collect();
-        let columns = pinned.iter().map(|b| b.count()).sum();
-        let evidence = self.together.evidence(&[&pinned[..], terms].concat());
-        let beside = Beside::of(&evidence, columns, self.rules.prior);
-        let gain = beside.and_then(|b| gain(&b.alone(&evidence), self.rules.prior));
+        self.given_pinned(&self.together.evidence(&[&self.pinned()[..], terms].concat()))
+    }
+
+    /// Gain of evidence on the pinned term and others, given the pinned term.
+    fn given_pinned(&self, evidence: &[Evidence]) -> f64 {
+        let columns = self.pinned().iter().map(|b| b.count()).sum();
+        let beside = Beside::of(evidence, columns, self.rules.prior);
+        let gain = beside.and_then(|b| gain(&b.alone(evidence), self.rules.prior));
         gain.map_or(0.0, |g| g.total)
+    }
+
+    /// [`Layer::total`] of `chosen` and one more basis, quick for many over the coordinate of `like`.
+    fn total_beside(&self, chosen: &[Chosen], like: &Basis) -> impl Fn(&Basis) -> f64 {
+        let beside = [self.pinned(), bases(chosen)].concat();
+        let views = self.together.fine.par_iter().zip(&self.groups);
+        let merged: Vec<_> =
+            views.filter_map(|(view, g)| merged(view, g, like.alone()?, &beside)).collect();
+        move |basis| {
+            if merged.is_empty() {
+                return self.total(&[&bases(chosen)[..], &[basis]].concat());
+            }
+            let of_view = |(g, rows): &(&Grouping, Rows<'_>)| {
+                rows.reduce(basis.count(), |i, row| basis.fill(&g.places[i], row))
+            };
+            self.given_pinned(&merged.iter().map(of_view).collect::<Vec<Evidence>>())
+        }
     }
 }
 

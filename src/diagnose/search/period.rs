@@ -1,7 +1,7 @@
 //! Refines a period between those that were tried.
 
 use super::candidate::Candidate;
-use super::outcome::{Chosen, bases};
+use super::outcome::Chosen;
 use crate::solve::brent;
 use crate::stats::range;
 use crate::terms::Basis;
@@ -12,20 +12,10 @@ const TO_SHARE: f64 = 0.002;
 /// Brent's method needs about ten.
 const MAX_STEPS: u64 = 30;
 
-/// Tunes the period of a named `next` to the largest gain beside `chosen`, between the tried periods
-/// next to its own. A nameless curve has no formula to follow. `total` is the joint gain of terms,
-/// nats.
-pub fn tune(
-    candidates: &[Candidate],
-    chosen: &[Chosen],
-    next: &mut Chosen,
-    total: impl Fn(&[&Basis]) -> f64,
-) {
-    let of_name = Some(&next.candidate).filter(|c| c.family.is_some());
-    let Some([low, high]) = of_name.and_then(|c| neighbours(candidates, c)) else { return };
-    let beside = bases(chosen);
-    let gain =
-        |period: f64| total(&[&beside[..], &[&next.candidate.basis.with_period(period)]].concat());
+/// Tunes the period of `next` between `low` and `high` to the largest gain. `total` is that of a basis
+/// beside the chosen terms, nats.
+pub fn tune([low, high]: [f64; 2], next: &mut Chosen, total: impl Fn(&Basis) -> f64) {
+    let gain = |period: f64| total(&next.candidate.basis.with_period(period));
     // The tried periods are evenly spaced in cycles over the image.
     let cycles = [1.0 / high, 1.0 / low];
     let tolerance = TO_SHARE * 0.5 * (cycles[1] - cycles[0]);
@@ -40,9 +30,10 @@ pub fn tune(
     }
 }
 
-/// Next smaller and next larger period among candidates of the same kind; `None` if there is only one.
-fn neighbours(candidates: &[Candidate], of: &Candidate) -> Option<[f64; 2]> {
-    let period = of.basis.period()?;
+/// Next smaller and next larger period among candidates of the same kind. `None` if there is only one,
+/// and for a nameless curve, which has no formula to follow.
+pub fn neighbours(candidates: &[Candidate], of: &Candidate) -> Option<[f64; 2]> {
+    let period = of.family.and(of.basis.period())?;
     let is_like = |c: &&Candidate| {
         c.family == of.family && c.basis.axis() == of.basis.axis() && c.basis.period().is_some()
     };
@@ -103,8 +94,8 @@ mod tests {
                 0.005 * (std::f64::consts::TAU * u as f64 / truth + phase).sin()
                     + NOISE_PX * noise()
             });
-            let total = |terms: &[&Basis]| {
-                let (beta, covariance) = fit(terms[0], &means);
+            let total = |basis: &Basis| {
+                let (beta, covariance) = fit(basis, &means);
                 0.5 * beta.dot(&(covariance.try_inverse().unwrap() * &beta))
             };
             let candidate = stripes(half_cycles.round() as u32);
@@ -117,7 +108,8 @@ mod tests {
                 rivals: Vec::new(),
                 p: 1.0,
             };
-            tune(&candidates, &[], &mut next, total);
+            let reach = neighbours(&candidates, &next.candidate).expect("several periods");
+            tune(reach, &mut next, total);
             let (beta, covariance) = fit(&next.candidate.basis, &means);
             let reach = Extent { column: [0.0, COLUMNS as f64], ..Extent::default() };
             let fit = Fitted {

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use rayon::prelude::*;
 
 use super::evidence::Evidence;
-use super::rows::Rows;
+use super::rows::{Entries, Rows};
 use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::tiles::SIDE;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
@@ -76,9 +76,8 @@ pub fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
         let side = NEIGHBOURS * place.side.max(1.0);
         (place.v / side) as usize * ACROSS + (place.u / side) as usize
     };
-    let fill = |i: usize, row: &mut [f64]| fill_all(terms, &view.places[i], row);
     let mut sum = Evidence::zeros(count);
-    rows.add_by_blocks(&mut sum, block, |_| (0..count).collect(), fill);
+    rows.add_by_blocks(&mut sum, block, |i, row| append_all(terms, &view.places[i], 0, row));
     sum.a.fill_upper_triangle_with_lower_triangle();
     Some(sum)
 }
@@ -90,6 +89,19 @@ pub fn fill_all(terms: &[impl Borrow<Basis>], place: &PixelContext, row: &mut [f
         let (mine, others) = rest.split_at_mut(basis.count());
         basis.fill(place, mine);
         rest = others;
+    }
+}
+
+/// Appends the columns of several terms that may be nonzero, the first of them numbered `first`.
+pub fn append_all(
+    terms: &[impl Borrow<Basis>],
+    place: &PixelContext,
+    mut first: usize,
+    row: &mut Entries,
+) {
+    for basis in terms.iter().map(Borrow::<Basis>::borrow) {
+        basis.visit(place, |k, g| row.push((first + k, g)));
+        first += basis.count();
     }
 }
 
@@ -106,6 +118,17 @@ fn rows<'a>(view: &'a ViewData, response: &[f64], beside: &[&Basis]) -> Option<R
         fill_all(beside, &view.places[i], &mut row[p..]);
     }
     Rows::new(response, &view.weight, &columns, width, &view.precision)
+}
+
+/// A view's rows beside these terms, merged by the grouping over this coordinate.
+pub fn merged<'a>(
+    view: &'a ViewData,
+    groupings: &'a [Grouping],
+    over: Coordinate,
+    beside: &[&Basis],
+) -> Option<(&'a Grouping, Rows<'a>)> {
+    let grouping = groupings.iter().find(|g| g.over == over)?;
+    Some((grouping, grouping.merge(&rows(view, &view.response, beside)?)))
 }
 
 pub fn prepare<'a>(
@@ -128,8 +151,7 @@ pub fn prepare<'a>(
         sums.iter().zip(&coarse.weight).map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 }).collect()
     };
     let rows_fine = rows(fine, &left, beside)?;
-    let grouped = |g: &'a Grouping| (g, rows_fine.grouped(g.places.len(), |i| g.of[i] as usize));
-    let groups = groups.iter().map(grouped).collect();
+    let groups = groups.iter().map(|g| (g, g.merge(&rows_fine))).collect();
     Some(Prepared {
         groups,
         is_one_size: coarse.gathered.is_empty(),
@@ -162,6 +184,11 @@ impl Grouping {
             (Coordinate::Edge, EDGE_GROUP_PX),
         ];
         steps.map(|(over, step)| Grouping::by(&view.places, over, step)).into()
+    }
+
+    /// Merges each group's samples.
+    fn merge<'a>(&self, rows: &Rows<'a>) -> Rows<'a> {
+        rows.grouped(self.places.len(), |i| self.of[i] as usize)
     }
 
     fn by(places: &[PixelContext], over: Coordinate, step: f64) -> Self {

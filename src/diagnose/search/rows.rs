@@ -131,50 +131,23 @@ impl<'a> Rows<'a> {
     }
 
     /// Adds what [`Rows::reduce`] gives to `sum`, for many columns of which neighbouring samples touch the
-    /// same few: `block` gives a sample's neighbourhood, `touched` the columns that may be nonzero in one, and
-    /// `columns` fills only these. Lower triangle only; the upper one is to be filled after the last view.
+    /// same few: `block` gives a sample's neighbourhood, `columns` appends the index and value of its columns
+    /// that may be nonzero. Lower triangle only; the upper one is to be filled after the last view.
     pub fn add_by_blocks(
         &self,
         sum: &mut Evidence,
         block: impl Fn(usize) -> usize,
-        touched: impl Fn(usize) -> Vec<usize>,
-        mut columns: impl FnMut(usize, &mut [f64]),
+        columns: impl Fn(usize, &mut Entries),
     ) {
-        let mut rows = Vec::new();
-        let cross = self.sum_blocks(sum, block, |block, members, few: &mut Vec<f64>| {
-            let touched = touched(block);
-            let width = touched.len().max(1);
-            rows.resize(members.len() * width, 0.0);
-            for (&(_, i), row) in members.iter().zip(rows.chunks_exact_mut(width)) {
-                columns(i, row);
-            }
-            let used = not_zero(&rows, touched.len());
-            for row in rows.chunks_exact(width) {
-                few.extend(used.iter().map(|&j| row[j]));
-            }
-            used.into_iter().map(|j| touched[j]).collect()
-        });
-        self.profile(sum, &cross);
-    }
-
-    /// Adds the products of the columns with each other to `sum`, and returns those with the nuisances,
-    /// the chosen terms and the response. `rows` appends a block's columns, sample by sample, and
-    /// returns their indices.
-    fn sum_blocks(
-        &self,
-        sum: &mut Evidence,
-        block: impl Fn(usize) -> usize,
-        mut rows: impl FnMut(usize, &[(usize, usize)], &mut Vec<f64>) -> Vec<usize>,
-    ) -> DMatrix<f64> {
         let m = self.width - self.nuisances();
         let mut cross = DMatrix::<f64>::zeros(self.width + 1, sum.b.len() - m);
         let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
         order.sort_unstable();
-        let mut few = Vec::new();
+        let mut few = Few::of(cross.ncols());
         for members in order.chunk_by(|a, b| a.0 == b.0) {
-            few.clear();
-            let touched = rows(members[0].0, members, &mut few);
-            let weighted = self.weighted(members, &few, touched.len());
+            few.fill(members.iter().map(|(_, i)| *i), &columns);
+            let touched = &few.touched;
+            let weighted = self.weighted(members, &few.rows, touched.len());
             let across = weighted.transpose();
             // The lower triangle alone, in strips.
             let strips = (touched.len() / STRIP).max(1);
@@ -191,7 +164,25 @@ impl<'a> Rows<'a> {
                 }
             }
         }
-        cross
+        self.profile(sum, &cross);
+    }
+
+    /// Scores on `count` columns, the nuisances profiled out. `columns` is that of [`Rows::add_by_blocks`].
+    pub fn scores_on(&self, count: usize, columns: impl Fn(usize, &mut Entries)) -> DVector<f64> {
+        let mut cross = DMatrix::<f64>::zeros(self.width + 1, count);
+        let mut entries = Entries::new();
+        for i in self.used() {
+            entries.clear();
+            columns(i, &mut entries);
+            let (w, sample) = (self.weight[i], self.sample(i));
+            for &(j, g) in &entries {
+                let into = cross.column_mut(j).into_iter();
+                into.zip(sample).for_each(|(sum, x)| *sum += w * g * x);
+            }
+        }
+        let p = self.nuisances();
+        let nuisances = &self.inverse * self.seen.rows(0, p);
+        cross.row(self.width).transpose() - cross.rows(0, p).tr_mul(&nuisances)
     }
 
     /// One column per sample: its `count` candidate columns, nuisances, chosen terms and response,
@@ -255,13 +246,56 @@ fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
     sum
 }
 
-/// Columns of a block of rows that are nonzero somewhere.
-fn not_zero(rows: &[f64], count: usize) -> Vec<usize> {
-    let mut sizes = vec![0.0; count];
-    for row in rows.chunks_exact(count.max(1)) {
-        sizes.iter_mut().zip(row).for_each(|(size, g)| *size += g.abs());
+/// Index and value of a sample's columns that may be nonzero.
+pub type Entries = Vec<(usize, f64)>;
+
+/// The columns that a block of samples touches.
+struct Few {
+    /// Their indices, ascending.
+    touched: Vec<usize>,
+    /// Row-major, one row per sample.
+    rows: Vec<f64>,
+    /// Place of every column among those touched.
+    place: Vec<usize>,
+    entries: Entries,
+}
+
+impl Few {
+    fn of(columns: usize) -> Self {
+        let (touched, rows, entries) = (Vec::new(), Vec::new(), Vec::new());
+        Few { touched, rows, place: vec![usize::MAX; columns], entries }
     }
-    (0..count).filter(|&j| sizes[j] != 0.0).collect()
+
+    fn fill(
+        &mut self,
+        samples: impl Iterator<Item = usize>,
+        columns: impl Fn(usize, &mut Entries),
+    ) {
+        self.touched.drain(..).for_each(|j| self.place[j] = usize::MAX);
+        self.entries.clear();
+        let mut ends = Vec::new();
+        for i in samples {
+            columns(i, &mut self.entries);
+            ends.push(self.entries.len());
+        }
+        for &(j, g) in &self.entries {
+            if g != 0.0 && self.place[j] == usize::MAX {
+                self.place[j] = 0;
+                self.touched.push(j);
+            }
+        }
+        self.touched.sort_unstable();
+        self.touched.iter().enumerate().for_each(|(k, &j)| self.place[j] = k);
+        let width = self.touched.len();
+        self.rows.clear();
+        self.rows.resize(ends.len() * width, 0.0);
+        let mut first = 0;
+        for (row, end) in self.rows.chunks_exact_mut(width.max(1)).zip(ends) {
+            let mine = self.entries[first..end].iter().filter(|(_, g)| *g != 0.0);
+            mine.for_each(|&(j, g)| row[self.place[j]] += g);
+            first = end;
+        }
+    }
 }
 
 #[cfg(test)]

@@ -28,21 +28,22 @@ fn neighbourhoods_sum_to_what_single_samples_do() {
     let rows = Rows::new(&response, &weight, &beside, 2, &[0.5]).expect("a level");
     let plain = rows.reduce(NODES + 1, fill);
     for side in [1, 7, SAMPLES] {
-        // The hats between the first and the last sample, and the dense column.
-        let touched = |block: usize| -> Vec<usize> {
-            let node = |i: usize| i.min(SAMPLES) * (NODES - 1) / SAMPLES;
-            let last = (node((block + 1) * side) + 1).min(NODES - 1);
-            (node(block * side)..=last).chain([NODES]).collect()
-        };
-        let few = |i: usize, row: &mut [f64]| {
+        // As often with the hats that are zero as without.
+        let columns = |i: usize, row: &mut Entries| {
             let mut whole = [0.0; NODES + 1];
             fill(i, &mut whole);
-            row.iter_mut().zip(touched(i / side)).for_each(|(g, k)| *g = whole[k]);
+            row.extend(whole.into_iter().enumerate().filter(|(_, g)| i < SAMPLES / 2 || *g != 0.0));
         };
         let mut blocks = Evidence::zeros(NODES + 2);
-        rows.add_by_blocks(&mut blocks, |i| i / side, touched, few);
+        rows.add_by_blocks(&mut blocks, |i| i / side, columns);
         blocks.a.fill_upper_triangle_with_lower_triangle();
         approx::assert_relative_eq!(blocks.a, plain.a, epsilon = 1e-9);
         approx::assert_relative_eq!(blocks.b, plain.b, epsilon = 1e-9);
+        let scores = rows.scores_on(NODES + 1, columns);
+        approx::assert_relative_eq!(
+            scores,
+            plain.b.rows(1, NODES + 1).into_owned(),
+            epsilon = 1e-9
+        );
     }
 }
