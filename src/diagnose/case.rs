@@ -185,9 +185,10 @@ impl<'a> Case<'a> {
         // The second run starts with the weights of the first.
         let first = self.baseline.is_none() && !self.extended;
         if first && self.options.ablation == Ablation::None {
-            // Steep parts of a bias were taken for correlated noise: views weigh more once the bias is
-            // known, as found by the search alone.
-            let (_, px) = self.everywhere(&found);
+            // Steep parts of a bias and whole lines were taken for correlated noise: views weigh more once
+            // these are known, as found by the search alone.
+            let (terms, px) = self.everywhere(&found);
+            let px = self.with_lines(&terms, px);
             if self.survey.reweigh(&self.fields, &px) {
                 fine = self.survey.mean_data();
                 found = self.survey.search_bias(&fine, camera, level, seed);

@@ -207,10 +207,31 @@ pub const ROW_NOISE: &str = "row-noise";
 
 fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let variance = variance_px2(views);
-    let plain = |families, statistic, axis, words: Option<&str>| TextureFinding {
-        words: words.map(String::from),
-        ..TextureFinding::named(families, statistic, axis)
+    // The noise of known rows adds to the error of what they share.
+    let means = if known.has(ROW_NOISE) {
+        Moderated::by_scatter(views)
+    } else {
+        Moderated::of(views, known)
     };
+    let known_px = known.parameter(ROW_NOISE, "sigma_px").unwrap_or(0.0);
+    let afresh = "each column is shifted as one, afresh in every frame";
+    let plain = |families, axis, words: Option<&str>| TextureFinding {
+        words: words.map(String::from),
+        ..TextureFinding::named(families, Statistic::Correlation, axis)
+    };
+    let afresh = [
+        (plain(vec![ROW_NOISE], Axis::Row, None), known_px * known_px),
+        (plain(vec![], Axis::Column, Some(afresh)), 0.0),
+    ];
+    let afresh = afresh.into_iter().enumerate().filter_map(|(axis, (plain, known_px2))| {
+        plain.shared(&means.mean_of_lines(axis)?, known_px2, variance, level)
+    });
+    still_lines(views, known, level).into_iter().chain(afresh).collect()
+}
+
+/// Constant errors of columns, rows and blotches. Uses only what the views share, and the size of their noise.
+pub fn still_lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
+    let variance = variance_px2(views);
     let still = [
         (Axis::Column, "each column has a constant error of its own, unlike its neighbours'"),
         (Axis::Row, "each row has a constant error of its own, unlike its neighbours'"),
@@ -221,27 +242,15 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
         let by_pattern = ViewMean::of(views, |s| Some(s.still.by_pattern_px2[k]));
         let m = ViewMean::of_pairs(views, |s| of(&s.still))?;
         let m = m.and_error(by_pattern.map_or(0.0, |m| m.value));
-        let plain = plain(vec![], Statistic::Bias, axis, Some(words));
+        let plain = TextureFinding {
+            words: Some(words.into()),
+            ..TextureFinding::named(vec![], Statistic::Bias, axis)
+        };
         // Columns, rows and blotches share one level.
         let found = plain.shared(&m, known.error_of_lines_px2(axis), variance, level / 3.0)?;
         Some(TextureFinding { p: 3.0 * found.p, ..found })
     });
-    // The noise of known rows adds to the error of what they share.
-    let means = if known.has(ROW_NOISE) {
-        Moderated::by_scatter(views)
-    } else {
-        Moderated::of(views, known)
-    };
-    let known_px = known.parameter(ROW_NOISE, "sigma_px").unwrap_or(0.0);
-    let afresh = "each column is shifted as one, afresh in every frame";
-    let afresh = [
-        (plain(vec![ROW_NOISE], Statistic::Correlation, Axis::Row, None), known_px * known_px),
-        (plain(vec![], Statistic::Correlation, Axis::Column, Some(afresh)), 0.0),
-    ];
-    let afresh = afresh.into_iter().enumerate().filter_map(|(axis, (plain, known_px2))| {
-        plain.shared(&means.mean_of_lines(axis)?, known_px2, variance, level)
-    });
-    still.chain(afresh).collect()
+    still.collect()
 }
 
 #[cfg(test)]

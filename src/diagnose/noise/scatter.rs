@@ -4,10 +4,10 @@ use super::lines::LearntLines;
 use super::skewness::skewness;
 use super::still::beside_bias;
 use super::structure::Structure;
-use super::structures::structures;
+use super::structures::{shared, structures};
 use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
-use super::{ROW_NOISE, further_textures, texture_findings, window};
+use super::{ROW_NOISE, further_textures, still_lines, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
 use crate::diagnose::case::{Case, MeanResult};
 use crate::diagnose::finding::pixels::{
@@ -27,6 +27,11 @@ pub struct ScatterResult {
     pub tails: Option<TextureFinding>,
     /// Search of the variance.
     pub outcome: Outcome,
+}
+
+/// Axes along which lines have constant errors.
+fn axes_of_lines(textures: &[TextureFinding]) -> Vec<Axis> {
+    textures.iter().filter(|t| t.are_still_lines()).map(|t| t.axis).collect()
 }
 
 impl Case<'_> {
@@ -92,10 +97,17 @@ impl Case<'_> {
         ScatterResult { structure, textures, tails, outcome }
     }
 
+    /// Subtracts what looks like constant lines beside these terms of the mean as well, px by view and pixel.
+    pub fn with_lines(&self, terms: &[Term], px: Vec<Vec<f32>>) -> Vec<Vec<f32>> {
+        let each = self.level(EACH_LEVEL);
+        let shared = shared(&self.fields, &px, &self.kept);
+        let axes = axes_of_lines(&still_lines(&shared, &self.known, each));
+        if axes.is_empty() { px } else { self.beside_lines(terms, &px, &axes).1 }
+    }
+
     /// Adds constant lines to the mean: without them the noise has its own size and tails.
     fn learn_lines(&mut self, mean: &mut MeanResult, textures: &[TextureFinding]) {
-        let still = textures.iter().filter(|t| t.are_still_lines());
-        let axes: Vec<Axis> = still.map(|t| t.axis).collect();
+        let axes = axes_of_lines(textures);
         if axes.is_empty() || self.baseline.is_some() {
             return;
         }
@@ -133,11 +145,23 @@ impl Case<'_> {
     }
 
     fn take_out_lines(&self, mean: &mut MeanResult, axes: &[Axis]) {
-        let views = beside_bias(&self.fields, &mean.px);
-        mean.lines = axes.iter().filter_map(|axis| LearntLines::of(&views, *axis)).collect();
-        let profiles = mean.lines.iter().map(|l| &l.profile);
-        let all: Vec<Term> = mean.terms.iter().chain(profiles).cloned().collect();
-        mean.px = pixel_terms(&self.fields, &all, &self.survey, &self.bench);
+        (mean.lines, mean.px) = self.beside_lines(&mean.terms, &mean.px, axes);
+    }
+
+    /// Lines along these axes beside terms of the mean, which are `px` by view and pixel, and the sum of both.
+    fn beside_lines(
+        &self,
+        terms: &[Term],
+        px: &[Vec<f32>],
+        axes: &[Axis],
+    ) -> (Vec<LearntLines>, Vec<Vec<f32>>) {
+        let views = beside_bias(&self.fields, px);
+        let lines: Vec<LearntLines> =
+            axes.iter().filter_map(|axis| LearntLines::of(&views, *axis)).collect();
+        let all: Vec<Term> =
+            terms.iter().chain(lines.iter().map(|l| &l.profile)).cloned().collect();
+        let px = pixel_terms(&self.fields, &all, &self.survey, &self.bench);
+        (lines, px)
     }
 
     /// Structure of the noise; against a simulation, what exceeds the simulation's.

@@ -64,6 +64,21 @@ pub struct Structure {
 }
 
 impl Structure {
+    /// Only the size of the noise.
+    pub fn of_size(field: &Field, bias: &[f32]) -> Self {
+        let first = field.first.first().map(|frame| fine_scale(field, frame, bias));
+        first.map_or_else(Structure::default, |frame| Structure::of_image(&frame))
+    }
+
+    /// The size of the noise in an image of it.
+    fn of_image(image: &[f32]) -> Self {
+        Structure {
+            pixels: image.iter().filter(|r| r.is_finite()).count() as f64,
+            variance_px2: mean(image.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0),
+            ..Structure::default()
+        }
+    }
+
     /// Share beyond four local standard deviations; `None` with too few readings.
     pub fn tail_share(&self) -> Option<f64> {
         (self.tails.n > MIN_READINGS).then(|| self.tails.share())
@@ -144,12 +159,12 @@ impl Structure {
 
 /// A view's structure, and what its lines share by pairs in short blocks.
 pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
-    let (mut s, mut short) = (Structure::default(), Lines::default());
-    s.step_px = field.step_px;
     let frames: Vec<Vec<f32>> = field.first.iter().map(|r| fine_scale(field, r, bias)).collect();
-    let Some(first) = frames.first() else { return (s, short) };
-    s.pixels = first.iter().filter(|r| r.is_finite()).count() as f64;
-    s.variance_px2 = mean(first.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0);
+    let size = frames.first().map_or_else(Structure::default, |first| Structure::of_image(first));
+    let (mut s, mut short) = (Structure { step_px: field.step_px, ..size }, Lines::default());
+    if frames.is_empty() {
+        return (s, short);
+    }
     let rounded = rounded_alike(field);
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, field.width, SHORT_LINE)).collect();

@@ -22,6 +22,14 @@ pub fn structures(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Ve
     all
 }
 
+/// Only the size of the noise, and what the views share.
+pub fn shared(fields: &[Field], bias: &[Vec<f32>], kept: &KeptPattern) -> Vec<Structure> {
+    let views = beside_bias(fields, bias);
+    let sizes = views.par_iter().map(|(field, bias)| Structure::of_size(field, bias));
+    let all: Vec<Structure> = sizes.collect();
+    all.into_iter().zip(still(&views, kept)).map(|(s, still)| Structure { still, ..s }).collect()
+}
+
 /// One-sided p-value, on either side, from which near pixels count as independent.
 const INDEPENDENT: f64 = 0.05;
 

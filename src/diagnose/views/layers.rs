@@ -177,14 +177,19 @@ impl Survey {
     }
 
     /// Measures the inflation of the views' means again with the bias found subtracted, px by view and pixel.
-    /// Returns `false` and changes nothing where the effect is small.
+    /// Returns `false` and changes nothing where they would together weigh little more.
     pub fn reweigh(&mut self, fields: &[Field], bias: &[Vec<f32>]) -> bool {
-        const LITTLE: f64 = 1.3;
+        /// A tenth more information makes errors a twentieth smaller.
+        const LITTLE: f64 = 1.1;
         let anew = inflations(fields, bias);
-        let more = |(view, new): (&SurveyedView, &(f64, Correlation))| {
-            new.0 > 0.0 && view.inflation > LITTLE * new.0
-        };
-        if !self.views.iter().zip(&anew).any(more) {
+        let (mut before, mut after) = (0.0, 0.0);
+        for (view, (inflation, _)) in self.views.iter().zip(&anew) {
+            let weight = view.whole_weight();
+            before += weight;
+            after +=
+                weight * if *inflation > 0.0 { (view.inflation / inflation).max(1.0) } else { 1.0 };
+        }
+        if after <= LITTLE * before {
             return false;
         }
         for (view, (inflation, correlation)) in self.views.iter_mut().zip(anew) {
