@@ -5,7 +5,7 @@
 //! the products with a box around each pixel are that of one shared with neighbours. Each costs a
 //! few passes over the image.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3, Vector5};
 
 use super::texture::without_outliers;
 use crate::diagnose::views::box_sums::over_boxes;
@@ -66,12 +66,14 @@ impl Pairs {
             let mut sums = [(Sum::default(), 0.0); 2];
             for line in 0..count {
                 let pixels = (0..length).map(|k| at(line, k));
-                let values: Vec<f64> = pixels.clone().map(|i| f64::from(level[i])).collect();
-                let products = along(&values);
-                let leverage = plane.leverage_along(&level, pixels);
-                for (k, (sum, leverages)) in sums.iter_mut().enumerate() {
-                    *sum = sum.and(products[k]);
-                    *leverages += leverage[k];
+                let seen = pixels.map(|i| {
+                    level[i].is_finite().then(|| (f64::from(level[i]), plane.whitened(i)))
+                });
+                let blocks = in_blocks(seen);
+                for ((sum, leverages), length) in sums.iter_mut().zip(BLOCKS_PX) {
+                    let (own, leverage) = along(&blocks, length);
+                    *sum = sum.and(own);
+                    *leverages += leverage;
                 }
             }
             sums.map(|(sum, leverage)| {
@@ -125,23 +127,38 @@ impl Sum {
     }
 }
 
-/// Sums over pairs of a line's pixels in blocks that do not touch, for either length of them.
-fn along(line: &[f64]) -> [Sum; 2] {
-    BLOCKS_PX.map(|length| {
-        // Sums and numbers: of all, of the pairs in blocks that touch, and of the block before.
-        let [mut whole, mut close, mut before] = [[0.0; 2]; 3];
-        for block in line.chunks(length) {
-            let seen = block.iter().filter(|r| r.is_finite());
-            let block = seen.fold([0.0; 2], |[sum, count], r| [sum + r, count + 1.0]);
-            for k in 0..2 {
-                whole[k] += block[k];
-                close[k] += block[k] * (block[k] + 2.0 * before[k]);
-            }
-            before = block;
+/// Sums over a block of a line's pixels: of their number, their values and the columns of the plane, whitened.
+type Block = Vector5<f64>;
+
+/// A line in its short blocks; `None` where there is no value.
+fn in_blocks(line: impl Iterator<Item = Option<(f64, Vector3<f64>)>>) -> Vec<Block> {
+    let [_, short] = BLOCKS_PX;
+    let mut blocks = Vec::new();
+    for (k, seen) in line.enumerate() {
+        if k % short == 0 {
+            blocks.push(Block::zeros());
         }
-        let [products, pairs] = [0, 1].map(|k: usize| whole[k].powi(2) - close[k]);
-        Sum { products, pairs }
-    })
+        if let (Some((r, w)), Some(block)) = (seen, blocks.last_mut()) {
+            *block += Block::new(1.0, r, w.x, w.y, w.z);
+        }
+    }
+    blocks
+}
+
+/// Sums over pairs of a line's pixels in blocks of this length that do not touch: of their products, and of
+/// the plane's leverage of one on the other.
+fn along(blocks: &[Block], length: usize) -> (Sum, f64) {
+    let [_, short] = BLOCKS_PX;
+    // Sums of all, of the pairs in blocks that touch, and of the block before.
+    let [mut whole, mut close, mut before] = [Block::zeros(); 3];
+    for merged in blocks.chunks(length / short) {
+        let block: Block = merged.iter().sum();
+        whole += block;
+        close += block.component_mul(&(block + 2.0 * before));
+        before = block;
+    }
+    let apart = whole.component_mul(&whole) - close;
+    (Sum { pairs: apart[0], products: apart[1] }, apart[2] + apart[3] + apart[4])
 }
 
 /// Sums over pairs within `reach` of each other, by box sums.
@@ -187,16 +204,9 @@ impl Plane {
         Vector3::new(1.0, x, y)
     }
 
-    /// Leverage of two pixels of a line on each other, summed over the pairs of [`along`].
-    fn leverage_along(&self, image: &[f32], line: impl Iterator<Item = usize> + Clone) -> [f64; 2] {
-        let mut all = [0.0; 2];
-        for k in 0..3 {
-            let whitened = |i: usize| (self.whitening * self.columns(i))[k];
-            let seen = |i: usize| if image[i].is_finite() { whitened(i) } else { f64::NAN };
-            let values: Vec<f64> = line.clone().map(seen).collect();
-            all.iter_mut().zip(along(&values)).for_each(|(all, sum)| *all += sum.products);
-        }
-        all
+    /// Columns whose products are the leverage of two pixels on each other.
+    fn whitened(&self, i: usize) -> Vector3<f64> {
+        self.whitening * self.columns(i)
     }
 }
 

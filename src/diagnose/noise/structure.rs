@@ -66,7 +66,8 @@ pub struct Structure {
 impl Structure {
     /// Only the size of the noise.
     pub fn of_size(field: &Field, bias: &[f32]) -> Self {
-        let first = field.first.first().map(|frame| fine_scale(field, frame, bias));
+        let cut = field.cut_to_target();
+        let first = field.first.first().map(|frame| fine_scale(&cut, frame, bias));
         first.map_or_else(Structure::default, |frame| Structure::of_image(&frame))
     }
 
@@ -159,7 +160,8 @@ impl Structure {
 
 /// A view's structure, and what its lines share by pairs in short blocks.
 pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
-    let frames: Vec<Vec<f32>> = field.first.iter().map(|r| fine_scale(field, r, bias)).collect();
+    let cut = field.cut_to_target();
+    let frames: Vec<Vec<f32>> = field.first.iter().map(|r| fine_scale(&cut, r, bias)).collect();
     let size = frames.first().map_or_else(Structure::default, |first| Structure::of_image(first));
     let (mut s, mut short) = (Structure { step_px: field.step_px, ..size }, Lines::default());
     if frames.is_empty() {
@@ -167,15 +169,15 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     }
     let rounded = rounded_alike(field);
     let level: Vec<Vec<f32>> =
-        frames.iter().map(|f| without_lines(f, field.width, SHORT_LINE)).collect();
+        frames.iter().map(|f| without_lines(f, cut.width, SHORT_LINE)).collect();
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
         s.lagged[lag - 1] = mean(pairs).map(|rho| rho - rounded);
     }
     (s.frame_log_variance, s.frame_pixels) = frame_log_variance(&frames);
-    let images: Vec<Vec<f32>> = field.first.iter().map(|r| field.image(r)).collect();
+    let images: Vec<Vec<f32>> = field.first.iter().map(|r| cut.image(r)).collect();
     let pairs: Option<Vec<Pairs>> =
-        changes(&images).iter().map(|change| Pairs::of(change, field.width, s.step_px)).collect();
+        changes(&images).iter().map(|change| Pairs::of(change, cut.width, s.step_px)).collect();
     if let Some(pairs) = pairs.filter(|p| !p.is_empty()) {
         let all = |of: &dyn Fn(&Pairs) -> Option<f64>| mean(pairs.iter().filter_map(of));
         let [long, by_short] = [0, 1].map(|k| Lines {
@@ -195,11 +197,11 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
         s.near_error = variance.sqrt() / pairs.len() as f64;
         s.near_sum = correlation(1).map(|rho| 1.0 + NEIGHBOURS as f64 * rho);
         s.correlation_profile =
-            correlation_profile(&changes(&frames), field.width, [s.row_px2, s.column_px2]);
+            correlation_profile(&changes(&frames), cut.width, [s.row_px2, s.column_px2]);
     }
     let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
     let shares = [share(s.row_px2), share(s.column_px2)];
-    let window = area(&moving(&frames, s.lagged[0]), field.width, shares);
+    let window = area(&moving(&frames, s.lagged[0]), cut.width, shares);
     s.window_px = Some(window.sqrt());
     // A window for only part of the noise is too weak to see lag by lag.
     let of_mean_px2 = frame_mean_px2(field, &s, window.max(s.near_sum.unwrap_or(1.0)));

@@ -40,31 +40,34 @@ pub struct SurveyedView {
 /// sample; and the pixels' correlation. Measured after subtracting smooth errors and the known bias (px, by
 /// pixel, or empty).
 pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
-    let rough = whitened_high_passed(&without_bias(&field.mean, bias), field);
+    let cut = field.cut_to_target();
+    let rough = whitened_high_passed(&without_bias(&field.mean, bias), field, &cut);
     let (mut sum, mut n) = (0.0, 0.0);
     for r in rough.iter().filter(|r| r.is_finite()) {
         sum += f64::from(*r).powi(2);
         n += 1.0;
     }
-    let correlation = measure_correlation(&rough, field.width);
+    let correlation = measure_correlation(&rough, cut.width);
     let inflation = if n > 0.0 { (sum / n * correlation.sum).max(1e-6) } else { f64::INFINITY };
     (inflation, correlation)
 }
 
-/// Whitened and high-passed residuals as an image.
-fn whitened_high_passed(residuals: &[f32], field: &Field) -> Vec<f32> {
+/// Whitened and high-passed residuals as an image of the target alone, `cut`.
+fn whitened_high_passed(residuals: &[f32], field: &Field, cut: &Field) -> Vec<f32> {
     let mut whitened: Vec<f32> = residuals.iter().zip(&field.sigma).map(|(r, s)| r / s).collect();
     // On a target not much larger than the box, the high-pass leaves most of a bowl. It would count as
     // correlated noise: the stronger the bowl, the less of it would be detected.
-    take_out_cubic(&mut whitened, &field.pixels, field.width);
-    field.high_passed(&whitened)
+    take_out_cubic(&mut whitened, &cut.pixels, cut.width);
+    cut.high_passed(&whitened)
 }
 
 /// Effective number of independent frames: 1 / (rho^2 + (1 - rho^2) / F) for F frames whose noise has the
 /// correlation rho.
 pub fn independent_frames(field: &Field) -> f64 {
     let [first, second, ..] = field.first.as_slice() else { return 1.0 };
-    let rho = same_pixel(&whitened_high_passed(first, field), &whitened_high_passed(second, field));
+    let cut = field.cut_to_target();
+    let [first, second] = [first, second].map(|f| whitened_high_passed(f, field, &cut));
+    let rho = same_pixel(&first, &second);
     let rho = if rho.is_finite() { rho.clamp(0.0, 1.0) } else { 0.0 };
     let frames = field.frames.len() as f64;
     1.0 / (rho * rho + (1.0 - rho * rho) / frames)
