@@ -24,9 +24,9 @@ use crate::terms::{Axis, ROOM_LUX, Statistic};
 pub const NAMED_LEVEL: f64 = 0.05;
 /// Level for naming a motion, by the better of two tests: noise that merely stands still less looks like one.
 const MOVING_LEVEL: f64 = 0.01;
-/// Largest share of the changing noise that steps are taken for. Where the noise that changes is less than 0.29
-/// of a step, part of their error stands still, too.
-const MAX_OF_STEPS: f64 = 0.5;
+/// Share of the growth of the constant part that the changing one lacks, from which on it is noise of its own. A
+/// cause that enlarges both alike brings 0, constant noise alone 1.
+const OF_ITS_OWN: f64 = 0.5;
 /// A part of the noise below this share cannot be told from the other.
 const MIN_PART: f64 = 0.005;
 
@@ -35,7 +35,7 @@ struct View {
     /// Log ratios of the variance to the simulated one.
     still: f64,
     changing: f64,
-    /// By how much more the constant part has grown than the changing one, of which the words' steps do not grow.
+    /// By how much more the constant part has grown than the changing one.
     apart: f64,
     /// Relative difference from the simulated variance.
     total: f64,
@@ -49,23 +49,25 @@ struct View {
 impl View {
     fn of(real: &Structure, twin: &Structure) -> Option<Self> {
         let parts = |s: &Structure| {
+            // Whole lines have tests of their own, and no part in the correlations.
+            let of_lines = [s.row_px2, s.column_px2].into_iter().flatten().map(|px2| px2.max(0.0));
+            let noise_px2 = Some(s.noise_px2() - of_lines.sum::<f64>()).filter(|px2| *px2 > 0.0)?;
             // What is constant in every view is a pattern of the sensor.
-            let fixed = s.still.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+            let fixed = s.still.fixed_px2.unwrap_or(0.0).max(0.0) / noise_px2.max(1e-12);
             let all = of_any_two(s).filter(|c| (MIN_PART..1.0 - MIN_PART).contains(c))?;
             let still = Some(all - fixed).filter(|still| *still > MIN_PART)?;
-            Some([still * s.variance_px2, (1.0 - all) * s.variance_px2])
+            Some([still * noise_px2, (1.0 - all) * noise_px2])
         };
         let fall = |s: &Structure| Some(s.lagged[0]? - later(s)?);
         let (ours, theirs) = (parts(real)?, parts(twin)?);
         let [still, changing] = [0, 1].map(|k| ours[k] / theirs[k]);
-        let of_steps = |s: &Structure| (s.step_px.powi(2) / 12.0 / theirs[1]).min(MAX_OF_STEPS);
         Some(View {
             still: still.ln(),
             changing: changing.ln(),
-            apart: ((still * (1.0 - of_steps(twin)) + of_steps(real)) / changing).ln(),
+            apart: (still / changing).ln(),
             total: real.variance_px2 / twin.variance_px2 - 1.0,
             falls: fall(real).zip(fall(twin)).map_or(f64::NAN, |(r, t)| r - t),
-            share: ours[0] / real.variance_px2,
+            share: ours[0] / real.noise_px2(),
             pixels: real.pixels,
         })
     }
@@ -128,8 +130,9 @@ impl NoiseParts {
                 ..self.texture()
             });
         }
-        // Blur and steps increase both parts, the changing one more.
-        if self.up(&self.still) && self.apart.p_above(0.0) < NAMED_LEVEL {
+        // Blur increases both parts, the changing one more.
+        let of_its_own = self.apart.value > OF_ITS_OWN * self.still.value;
+        if self.up(&self.still) && of_its_own && self.apart.p_above(0.0) < NAMED_LEVEL {
             return Some(TextureFinding {
                 families: vec!["frozen-noise"],
                 statistic: Statistic::Correlation,

@@ -31,7 +31,7 @@ pub(in crate::diagnose) fn common(
     if !told {
         return [0.0; 3];
     }
-    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged[lag]));
+    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged_as_stored()[lag]));
     let is_measured = |lag: usize| structure.iter().any(|s| s.lagged[lag].is_some());
     let second = if is_measured(1) { at(1) } else { at(0) };
     [at(0), second, if is_measured(2) { at(2) } else { at(1) }]
@@ -84,7 +84,8 @@ pub(in crate::diagnose) fn measure_tails(
         let factor = |k: usize| factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
         let sigma_px: Vec<f32> = (0..told.len()).map(|k| field.sigma[k] * factor(k)).collect();
         // Single frames, unless their constant part could be taken for a tail.
-        let apart = s.lagged[0].is_some_and(|c| c < HARDLY_STILL);
+        let next = s.lagged_as_stored()[0];
+        let apart = next.is_some_and(|c| c < HARDLY_STILL);
         let cut = field.cut_to_target();
         let whitened = |frame: &Vec<f32>| {
             let white = |k: usize| {
@@ -95,7 +96,7 @@ pub(in crate::diagnose) fn measure_tails(
         };
         let mut looks: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
         if !apart && !looks.is_empty() {
-            looks = vec![moving(&looks, s.lagged[0])];
+            looks = vec![moving(&looks, next)];
         }
         (s.tails, s.moments) = (TailCounts::default(), Moments::default());
         let mut far = vec![false; looks.first().map_or(0, Vec::len)];

@@ -22,7 +22,12 @@ pub fn of_any_two(s: &Structure) -> Option<f64> {
 impl Structure {
     /// Standard error of the mean correlation of so many `pairs` of frames that share nothing.
     pub fn lagged_error(&self, pairs: f64) -> f64 {
-        (self.repeats() / (self.pixels * pairs)).sqrt()
+        (self.repeats() / (self.pixels * pairs)).sqrt() / (1.0 - self.rounding)
+    }
+
+    /// Correlation of a pixel with itself 1, 2 and 3 frames later, in the words.
+    pub fn lagged_as_stored(&self) -> [Option<f64>; 3] {
+        self.lagged.map(|c| Some(c? * (1.0 - self.rounding)))
     }
 
     /// Same of successive frames beside a pattern of this variance, which varies by chance over a view's
@@ -42,7 +47,7 @@ impl Structure {
 
     /// Share of a pattern in the variance, and the rest.
     fn pattern_share(&self, pattern_px2: f64) -> (f64, f64) {
-        let share = (pattern_px2.max(0.0) / self.variance_px2.max(1e-12)).min(LARGEST_PATTERN);
+        let share = (pattern_px2.max(0.0) / self.noise_px2().max(1e-12)).min(LARGEST_PATTERN);
         (share, 1.0 - share)
     }
 }

@@ -36,7 +36,9 @@ pub struct Structure {
     pub near_error: f64,
     /// Sum of the correlation over a pixel and all near ones.
     pub near_sum: Option<f64>,
-    /// Correlation of a pixel with itself 1, 2 and 3 frames later.
+    /// Share of that variance which rounding to steps added: each frame is rounded anew.
+    pub rounding: f64,
+    /// Correlation of a pixel with itself 1, 2 and 3 frames later, before rounding.
     pub lagged: [Option<f64>; 3],
     /// Log ratio of each of the first frames' variance to that of the others.
     pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
@@ -104,6 +106,11 @@ impl Structure {
         Some([disparity, disparity - 6.0 * self.relative_sigma])
     }
 
+    /// Variance before rounding, px^2.
+    pub fn noise_px2(&self) -> f64 {
+        self.variance_px2 * (1.0 - self.rounding)
+    }
+
     pub fn take_lines(&mut self, lines: Lines) {
         (self.row_px2, self.column_px2, self.line_pairs) = (lines.row, lines.column, lines.pairs);
     }
@@ -158,6 +165,9 @@ impl Structure {
     }
 }
 
+/// Largest share of the variance that is taken for rounding.
+const MAX_ROUNDING: f64 = 0.5;
+
 /// A view's structure, and what its lines share by pairs in short blocks.
 pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let cut = field.cut_to_target();
@@ -167,12 +177,14 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     if frames.is_empty() {
         return (s, short);
     }
+    // Of words nearly without noise, a pixel's own place on the step decides: that is no noise of any frame.
+    s.rounding = (s.step_px.powi(2) / 12.0 / s.variance_px2.max(1e-12)).min(MAX_ROUNDING);
     let rounded = rounded_alike(field);
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, cut.width, SHORT_LINE)).collect();
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
-        s.lagged[lag - 1] = mean(pairs).map(|rho| rho - rounded);
+        s.lagged[lag - 1] = mean(pairs).map(|rho| (rho - rounded) / (1.0 - s.rounding));
     }
     (s.frame_log_variance, s.frame_pixels) = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| cut.image(r)).collect();
@@ -201,7 +213,7 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     }
     let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
     let shares = [share(s.row_px2), share(s.column_px2)];
-    let window = area(&moving(&frames, s.lagged[0]), cut.width, shares);
+    let window = area(&moving(&frames, s.lagged_as_stored()[0]), cut.width, shares);
     s.window_px = Some(window.sqrt());
     // A window for only part of the noise is too weak to see lag by lag.
     let of_mean_px2 = frame_mean_px2(field, &s, window.max(s.near_sum.unwrap_or(1.0)));
@@ -214,7 +226,7 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
 
 /// Variance of a frame's mean due to the noise of its pixels and rows, px^2.
 fn frame_mean_px2(field: &Field, s: &Structure, correlation_sum: f64) -> f64 {
-    let still = s.lagged[0].unwrap_or(0.0).clamp(0.0, 1.0);
+    let still = s.lagged_as_stored()[0].unwrap_or(0.0).clamp(0.0, 1.0);
     let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
     own + s.row_px2.unwrap_or(0.0).max(0.0) / rows(field)
 }
@@ -262,7 +274,42 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::plane::Plane;
     use crate::rng::Seed;
+
+    /// Frames of a tilted plane in words of one step, half of whose noise is the same in all: the share is that of
+    /// the noise, whatever rounding adds. Twelve views give it to .002.
+    #[test]
+    fn rounding_lowers_no_share_that_stands_still() {
+        const SIDE: usize = 120;
+        const STILL: f64 = 0.5;
+        const STEP_PX: f64 = 0.125;
+        for steps in [0.6, 0.8, 1.5] {
+            let view = |seed: u64| {
+                let mut rng = Seed(seed).stream("structure/rounding");
+                let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+                let pixels: Vec<u32> = (0..(SIDE * SIDE) as u32).collect();
+                let sides = [SIDE, SIDE];
+                let mut field = Field::unseen(Plane::default(), 40.0, sides, pixels);
+                let still: Vec<f64> = (0..SIDE * SIDE).map(|_| STILL.sqrt() * normal()).collect();
+                let mut word = |i: usize| {
+                    let plane = 0.137 * (i % SIDE) as f64 + 0.071 * (i / SIDE) as f64;
+                    let noise = still[i] + (1.0 - STILL).sqrt() * normal();
+                    (STEP_PX * ((plane + steps * noise).round() - plane)) as f32
+                };
+                field.first = (0..4).map(|_| (0..SIDE * SIDE).map(&mut word).collect()).collect();
+                let variance = STEP_PX.powi(2) * (steps.powi(2) + 1.0 / 12.0);
+                field.sigma = vec![variance.sqrt() as f32; SIDE * SIDE];
+                field.step_px = STEP_PX;
+                structure(&field, &[]).0
+            };
+            let views: Vec<Structure> = (0..12).map(view).collect();
+            for lag in 0..3 {
+                let share = mean(views.iter().filter_map(|s| s.lagged[lag])).expect("four frames");
+                assert!((share - STILL).abs() < 0.008, "{share} at lag {lag}, {steps} steps");
+            }
+        }
+    }
 
     /// A square of white pixels whose rows share an error half as large: variance of a row's mean, and of its
     /// mean square, over that of as many independent pixels.
