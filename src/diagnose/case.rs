@@ -185,8 +185,8 @@ impl<'a> Case<'a> {
         // The second run starts with the weights of the first.
         let first = self.baseline.is_none() && !self.extended;
         if first && self.options.ablation == Ablation::None {
-            // Steep parts of a bias and whole lines were taken for correlated noise: views weigh more once
-            // these are known, as found by the search alone.
+            // Steep parts of a bias and constant lines were taken for correlated noise: views weigh more
+            // once both are known.
             let (terms, px) = self.everywhere(&found);
             let px = self.with_lines(&terms, px);
             if self.survey.reweigh(&self.fields, &px) {

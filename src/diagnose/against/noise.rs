@@ -24,8 +24,8 @@ use crate::terms::{Axis, ROOM_LUX, Statistic};
 pub const NAMED_LEVEL: f64 = 0.05;
 /// Level for naming a motion, by the better of two tests: noise that merely stands still less looks like one.
 const MOVING_LEVEL: f64 = 0.01;
-/// Share of the growth of the constant part that the changing one lacks, from which on it is noise of its own. A
-/// cause that enlarges both alike brings 0, constant noise alone 1.
+/// Smallest share of the constant part's log growth, missing from the changing part, for which constant noise has
+/// a cause of its own: 0 for a cause that enlarges both alike, 1 for constant noise alone.
 const OF_ITS_OWN: f64 = 0.5;
 /// A part of the noise below this share cannot be told from the other.
 const MIN_PART: f64 = 0.005;
@@ -35,13 +35,11 @@ struct View {
     /// Log ratios of the variance to the simulated one.
     still: f64,
     changing: f64,
-    /// By how much more the constant part has grown than the changing one.
-    apart: f64,
     /// Relative difference from the simulated variance.
     total: f64,
     /// Additional fall of the correlation of two frames with the time between them.
     falls: f64,
-    /// Constant share of this view's variance.
+    /// Constant share of this view's noise.
     share: f64,
     pixels: f64,
 }
@@ -49,11 +47,9 @@ struct View {
 impl View {
     fn of(real: &Structure, twin: &Structure) -> Option<Self> {
         let parts = |s: &Structure| {
-            // Whole lines have tests of their own, and no part in the correlations.
-            let of_lines = [s.row_px2, s.column_px2].into_iter().flatten().map(|px2| px2.max(0.0));
-            let noise_px2 = Some(s.noise_px2() - of_lines.sum::<f64>()).filter(|px2| *px2 > 0.0)?;
+            let noise_px2 = Some(s.noise_px2()).filter(|px2| *px2 > 0.0)?;
             // What is constant in every view is a pattern of the sensor.
-            let fixed = s.still.fixed_px2.unwrap_or(0.0).max(0.0) / noise_px2.max(1e-12);
+            let fixed = s.still.fixed_px2.unwrap_or(0.0).max(0.0) / noise_px2;
             let all = of_any_two(s).filter(|c| (MIN_PART..1.0 - MIN_PART).contains(c))?;
             let still = Some(all - fixed).filter(|still| *still > MIN_PART)?;
             Some([still * noise_px2, (1.0 - all) * noise_px2])
@@ -64,7 +60,6 @@ impl View {
         Some(View {
             still: still.ln(),
             changing: changing.ln(),
-            apart: (still / changing).ln(),
             total: real.variance_px2 / twin.variance_px2 - 1.0,
             falls: fall(real).zip(fall(twin)).map_or(f64::NAN, |(r, t)| r - t),
             share: ours[0] / real.noise_px2(),
@@ -78,7 +73,7 @@ pub struct NoiseParts {
     views: Vec<View>,
     still: ViewMean,
     changing: ViewMean,
-    /// Mean of the views' `apart`.
+    /// By how much more the constant part has grown than the changing one.
     apart: ViewMean,
     level: f64,
 }
@@ -89,7 +84,7 @@ impl NoiseParts {
         let views: Vec<View> = real.iter().zip(twins).filter_map(|(r, t)| View::of(r, t)).collect();
         let mean = |of: fn(&View) -> f64| mean(&views, of);
         let (still, changing) = (mean(|v| v.still)?, mean(|v| v.changing)?);
-        let apart = mean(|v| v.apart)?;
+        let apart = mean(|v| v.still - v.changing)?;
         Some(NoiseParts { still, changing, apart, views, level })
     }
 

@@ -44,7 +44,8 @@ fn each_cause_changes_the_parts_in_its_own_way() {
         ("less light", [1.0, 1.6], 0.0, nameless.clone()),
         ("read noise", [0.95, 2.2], 0.0, nameless.clone()),
         ("more blur", [1.3, 2.0], 0.0, nameless.clone()),
-        ("a smaller window", [1.5, 1.5], 0.0, nameless),
+        ("a smaller window", [1.5, 1.5], 0.0, nameless.clone()),
+        ("steeper noise, less of it renewed", [1.6, 1.4], 0.0, nameless),
     ];
     for (what, of, falls, names) in table {
         let right = (0..40).filter(|seed| {

@@ -122,7 +122,7 @@ pub fn beyond<'a>(id: &str, known: &'a KnownTerms) -> Option<OfView<'a>> {
     let (px2, fraction, rho) =
         (parameter("sigma_px").powi(2), parameter("fraction"), parameter("rho"));
     let still =
-        |s: &Structure| s.still.fixed_px2.unwrap_or(0.0).max(0.0) / s.variance_px2.max(1e-12);
+        |s: &Structure| s.still.fixed_px2.unwrap_or(0.0).max(0.0) / s.noise_px2().max(1e-12);
     Some(match id {
         "spatial-correlation" => {
             let side = expected_window(known);

@@ -86,13 +86,12 @@ pub(in crate::diagnose) fn measure_tails(
         // Single frames, unless their constant part could be taken for a tail.
         let next = s.lagged_as_stored()[0];
         let apart = next.is_some_and(|c| c < HARDLY_STILL);
-        let cut = field.cut_to_target();
         let whitened = |frame: &Vec<f32>| {
             let white = |k: usize| {
                 let error = frame[k] - bias.get(n).map_or(0.0, |b| b[k]);
                 if told[k] { error / sigma_px[k] } else { f32::NAN }
             };
-            cut.high_passed(&(0..frame.len()).map(white).collect::<Vec<f32>>())
+            field.high_passed(&(0..frame.len()).map(white).collect::<Vec<f32>>())
         };
         let mut looks: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
         if !apart && !looks.is_empty() {
@@ -101,10 +100,10 @@ pub(in crate::diagnose) fn measure_tails(
         (s.tails, s.moments) = (TailCounts::default(), Moments::default());
         let mut far = vec![false; looks.first().map_or(0, Vec::len)];
         for look in &looks {
-            s.tails.add(&tail(look, cut.width, &mut far));
-            s.moments.add(&Moments::of(look, cut.width));
+            s.tails.add(&tail(look, field.width, &mut far));
+            s.moments.add(&Moments::of(look, field.width));
         }
-        s.far_places = places(far, cut.width);
+        s.far_places = places(far, field.width);
         let disparity = |k| field.disparity(k, &bench.rays) as f32;
         let relative = sigma_px.iter().enumerate().map(|(k, s)| f64::from(s / disparity(k)));
         s.relative_sigma = mean(relative.filter(|s| s.is_finite())).unwrap_or(0.0);

@@ -6,6 +6,7 @@ use super::texture_finding::TextureFinding;
 use super::view_mean::{ViewMean, nats, variance_px2};
 use crate::diagnose::finding::parameters::one;
 use crate::diagnose::views::known::KnownTerms;
+use crate::stats::mean;
 use crate::terms::{Axis, Statistic};
 
 /// Effect id: a constant error of each pixel.
@@ -75,6 +76,11 @@ fn beside(
 ) -> Vec<TextureFinding> {
     let mut found = Vec::new();
     let Some(first) = views.mean(next) else { return found };
+    let of_frames = |families, interval, parameter, share: f64, evidence| {
+        // Sizes are those of the stored words, rounding included.
+        let stored = mean(views.views.iter().map(|s| 1.0 - s.rounding)).unwrap_or(1.0);
+        of_frames(families, interval, parameter, share * stored, evidence)
+    };
     let first = first.and_error(of_pattern);
     let first_error = first.std_error.max(by_chance(views.views));
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
@@ -132,7 +138,10 @@ fn beside(
 /// Standard error of the correlation of white noise: one over the root of the number of pixels. A few views
 /// may happen to agree better.
 fn by_chance(views: &[Structure]) -> f64 {
-    let pairs = |s: &Structure| s.pixels * s.lagged.iter().flatten().count() as f64;
+    let pairs = |s: &Structure| {
+        let lags = s.lagged.iter().flatten().count() as f64;
+        s.pixels * lags * (1.0 - s.rounding).powi(2)
+    };
     let pairs: f64 = views.iter().map(pairs).sum();
     if pairs > 0.0 { pairs.sqrt().recip() } else { 0.0 }
 }
@@ -147,7 +156,7 @@ fn beside_pattern(views: &[Structure], fixed: Option<ViewMean>) -> Vec<Structure
 
 /// Mean inverse variance, px^-2.
 fn mean_precision(views: &[Structure]) -> f64 {
-    let precision = |s: &Structure| (s.variance_px2 > 0.0).then(|| 1.0 / s.variance_px2);
+    let precision = |s: &Structure| (s.noise_px2() > 0.0).then(|| 1.0 / s.noise_px2());
     ViewMean::of(views, precision).map_or(0.0, |m| m.value)
 }
 

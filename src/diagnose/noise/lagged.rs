@@ -25,11 +25,6 @@ impl Structure {
         (self.repeats() / (self.pixels * pairs)).sqrt() / (1.0 - self.rounding)
     }
 
-    /// Correlation of a pixel with itself 1, 2 and 3 frames later, in the words.
-    pub fn lagged_as_stored(&self) -> [Option<f64>; 3] {
-        self.lagged.map(|c| Some(c? * (1.0 - self.rounding)))
-    }
-
     /// Same of successive frames beside a pattern of this variance, which varies by chance over a view's
     /// pixels.
     pub fn lagged_error_beside(&self, pattern_px2: f64) -> f64 {
@@ -43,6 +38,11 @@ impl Structure {
     pub fn beside_pattern(&self, pattern_px2: f64) -> [Option<f64>; 3] {
         let (share, left) = self.pattern_share(pattern_px2);
         self.lagged.map(|c| Some((c? - share) / left))
+    }
+
+    /// Correlation of a pixel with itself 1, 2 and 3 frames later, of the stored words, rounding included.
+    pub fn lagged_as_stored(&self) -> [Option<f64>; 3] {
+        self.lagged.map(|c| Some(c? * (1.0 - self.rounding)))
     }
 
     /// Share of a pattern in the variance, and the rest.

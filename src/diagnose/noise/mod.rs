@@ -226,11 +226,11 @@ fn lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFind
     let afresh = afresh.into_iter().enumerate().filter_map(|(axis, (plain, known_px2))| {
         plain.shared(&means.mean_of_lines(axis)?, known_px2, variance, level)
     });
-    still_lines(views, known, level).into_iter().chain(afresh).collect()
+    still_errors(views, known, level).into_iter().chain(afresh).collect()
 }
 
 /// Constant errors of columns, rows and blotches. Uses only what the views share, and the size of their noise.
-pub fn still_lines(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
+pub fn still_errors(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<TextureFinding> {
     let variance = variance_px2(views);
     let still = [
         (Axis::Column, "each column has a constant error of its own, unlike its neighbours'"),

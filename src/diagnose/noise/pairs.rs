@@ -18,7 +18,7 @@ pub const REACH_PX: usize = 4;
 /// information of all lags; with equal weights, one of 3 px shows 23 % and those of 7 to 9 px up to 76 % in place
 /// of 60 %.
 const OUTER_WEIGHT: f64 = 0.25;
-/// Lengths of a line's blocks, px. Pixels of touching blocks may share a window; where the noise has none,
+/// Lengths of a line's blocks, px; the second divides the first. Pixels of touching blocks may share a window; where the noise has none,
 /// the short ones keep more pairs.
 const BLOCKS_PX: [usize; 2] = [16, 4];
 /// Fewest pairs for an estimate.

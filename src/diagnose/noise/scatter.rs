@@ -7,7 +7,7 @@ use super::structure::Structure;
 use super::structures::{shared, structures};
 use super::tails::{Confusers, tails};
 use super::texture_finding::TextureFinding;
-use super::{ROW_NOISE, further_textures, still_lines, texture_findings, window};
+use super::{ROW_NOISE, further_textures, still_errors, texture_findings, window};
 use crate::diagnose::against::noise::{NAMED_LEVEL, NoiseParts};
 use crate::diagnose::case::{Case, MeanResult};
 use crate::diagnose::finding::pixels::{
@@ -97,11 +97,12 @@ impl Case<'_> {
         ScatterResult { structure, textures, tails, outcome }
     }
 
-    /// Subtracts what looks like constant lines beside these terms of the mean as well, px by view and pixel.
+    /// Adds what looks like constant lines to the terms of the mean, which are `px` by view and pixel.
     pub fn with_lines(&self, terms: &[Term], px: Vec<Vec<f32>>) -> Vec<Vec<f32>> {
         let each = self.level(EACH_LEVEL);
-        let shared = shared(&self.fields, &px, &self.kept);
-        let axes = axes_of_lines(&still_lines(&shared, &self.known, each));
+        let mut still = still_errors(&shared(&self.fields, &px, &self.kept), &self.known, each);
+        still.retain(|t| self.stands(t.p, each));
+        let axes = axes_of_lines(&still);
         if axes.is_empty() { px } else { self.beside_lines(terms, &px, &axes).1 }
     }
 

@@ -24,6 +24,10 @@ pub struct Structure {
     pub pixels: f64,
     /// Variance of the first frame's high-passed residual, px^2.
     pub variance_px2: f64,
+    /// Part of it that the means of rows and columns hold, px^2.
+    pub lines_px2: f64,
+    /// Share of the rest that is the error of rounding to steps.
+    pub rounding: f64,
     /// Step between the stored words, px.
     pub step_px: f64,
     /// Side of the window that would cause the correlation, px.
@@ -36,8 +40,6 @@ pub struct Structure {
     pub near_error: f64,
     /// Sum of the correlation over a pixel and all near ones.
     pub near_sum: Option<f64>,
-    /// Share of that variance which rounding to steps added: each frame is rounded anew.
-    pub rounding: f64,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later, before rounding.
     pub lagged: [Option<f64>; 3],
     /// Log ratio of each of the first frames' variance to that of the others.
@@ -106,9 +108,9 @@ impl Structure {
         Some([disparity, disparity - 6.0 * self.relative_sigma])
     }
 
-    /// Variance before rounding, px^2.
+    /// Variance without whole lines and before rounding, px^2.
     pub fn noise_px2(&self) -> f64 {
-        self.variance_px2 * (1.0 - self.rounding)
+        (self.variance_px2 - self.lines_px2) * (1.0 - self.rounding)
     }
 
     pub fn take_lines(&mut self, lines: Lines) {
@@ -172,16 +174,16 @@ const MAX_ROUNDING: f64 = 0.5;
 pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let cut = field.cut_to_target();
     let frames: Vec<Vec<f32>> = field.first.iter().map(|r| fine_scale(&cut, r, bias)).collect();
-    let size = frames.first().map_or_else(Structure::default, |first| Structure::of_image(first));
-    let (mut s, mut short) = (Structure { step_px: field.step_px, ..size }, Lines::default());
-    if frames.is_empty() {
-        return (s, short);
-    }
-    // Of words nearly without noise, a pixel's own place on the step decides: that is no noise of any frame.
-    s.rounding = (s.step_px.powi(2) / 12.0 / s.variance_px2.max(1e-12)).min(MAX_ROUNDING);
-    let rounded = rounded_alike(field);
+    let mut short = Lines::default();
+    let Some(first) = frames.first() else { return (Structure::default(), short) };
+    let mut s = Structure { step_px: field.step_px, ..Structure::of_image(first) };
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, cut.width, SHORT_LINE)).collect();
+    let left_px2 = Structure::of_image(&level[0]).variance_px2;
+    s.lines_px2 = (s.variance_px2 - left_px2).max(0.0);
+    // Where the noise is small against a step, a pixel's rounding error hardly changes from frame to frame.
+    s.rounding = (s.step_px.powi(2) / 12.0 / left_px2.max(1e-12)).min(MAX_ROUNDING);
+    let rounded = rounded_alike(field);
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
         s.lagged[lag - 1] = mean(pairs).map(|rho| (rho - rounded) / (1.0 - s.rounding));
@@ -270,108 +272,5 @@ fn correlation_profile(
 }
 
 #[cfg(test)]
-mod tests {
-    use rand_distr::{Distribution, StandardNormal};
-
-    use super::*;
-    use crate::plane::Plane;
-    use crate::rng::Seed;
-
-    /// Frames of a tilted plane in words of one step, half of whose noise is the same in all: the share is that of
-    /// the noise, whatever rounding adds. Twelve views give it to .002.
-    #[test]
-    fn rounding_lowers_no_share_that_stands_still() {
-        const SIDE: usize = 120;
-        const STILL: f64 = 0.5;
-        const STEP_PX: f64 = 0.125;
-        for steps in [0.6, 0.8, 1.5] {
-            let view = |seed: u64| {
-                let mut rng = Seed(seed).stream("structure/rounding");
-                let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-                let pixels: Vec<u32> = (0..(SIDE * SIDE) as u32).collect();
-                let sides = [SIDE, SIDE];
-                let mut field = Field::unseen(Plane::default(), 40.0, sides, pixels);
-                let still: Vec<f64> = (0..SIDE * SIDE).map(|_| STILL.sqrt() * normal()).collect();
-                let mut word = |i: usize| {
-                    let plane = 0.137 * (i % SIDE) as f64 + 0.071 * (i / SIDE) as f64;
-                    let noise = still[i] + (1.0 - STILL).sqrt() * normal();
-                    (STEP_PX * ((plane + steps * noise).round() - plane)) as f32
-                };
-                field.first = (0..4).map(|_| (0..SIDE * SIDE).map(&mut word).collect()).collect();
-                let variance = STEP_PX.powi(2) * (steps.powi(2) + 1.0 / 12.0);
-                field.sigma = vec![variance.sqrt() as f32; SIDE * SIDE];
-                field.step_px = STEP_PX;
-                structure(&field, &[]).0
-            };
-            let views: Vec<Structure> = (0..12).map(view).collect();
-            for lag in 0..3 {
-                let share = mean(views.iter().filter_map(|s| s.lagged[lag])).expect("four frames");
-                assert!((share - STILL).abs() < 0.008, "{share} at lag {lag}, {steps} steps");
-            }
-        }
-    }
-
-    /// A square of white pixels whose rows share an error half as large: variance of a row's mean, and of its
-    /// mean square, over that of as many independent pixels.
-    #[test]
-    fn rows_that_err_alike_are_worth_less() {
-        const SIDE: usize = 60;
-        const ROWS: usize = 40_000;
-        const ROW_PX: f64 = 0.5;
-        let mut rng = Seed(3).stream("structure/rows");
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let (mut means, mut squares) = (Vec::new(), Vec::new());
-        for _ in 0..ROWS {
-            let row = ROW_PX * normal();
-            let pixels: Vec<f64> = (0..SIDE).map(|_| row + normal()).collect();
-            means.push(pixels.iter().sum::<f64>() / SIDE as f64);
-            squares.push(pixels.iter().map(|p| p * p).sum::<f64>() / SIDE as f64);
-        }
-        let spread = |all: &[f64]| {
-            let level = all.iter().sum::<f64>() / ROWS as f64;
-            all.iter().map(|x| (x - level).powi(2)).sum::<f64>() / ROWS as f64
-        };
-        let power = 1.0 + ROW_PX * ROW_PX;
-        let apart = [power / SIDE as f64, 2.0 * power * power / SIDE as f64];
-        let truth = [spread(&means) / apart[0], spread(&squares) / apart[1]];
-        let s = Structure {
-            pixels: (SIDE * SIDE) as f64,
-            variance_px2: power,
-            row_px2: Some(ROW_PX * ROW_PX),
-            ..Structure::default()
-        };
-        for (got, truth) in s.excess_of_rows(&Correlation::white()).iter().zip(truth) {
-            // The pixel itself is one of the sixty in its row.
-            assert!((got / truth - 1.0).abs() < 0.06, "{got}, by simulation {truth}");
-        }
-        let none = Structure { row_px2: Some(-1e-4), ..s };
-        assert_eq!(none.excess_of_rows(&Correlation::white()), [1.0; 2]);
-    }
-
-    /// Means over six views whose pixels share an error, simulated 5,000 times: they scatter as stated to
-    /// 4 %, twice the standard error of such a scatter.
-    #[test]
-    fn views_with_a_pattern_in_common_are_worth_fewer() {
-        const VIEWS: usize = 6;
-        const FRAMES: usize = 4;
-        const PATTERN_PX: f64 = 0.4;
-        let mut rng = Seed(5).stream("structure/pattern");
-        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
-        let (mut together, mut each) = (0.0, 0.0);
-        for _ in 0..5000 {
-            let pattern = PATTERN_PX * draw();
-            let views: Vec<f64> =
-                (0..VIEWS).map(|_| pattern + draw() / (FRAMES as f64).sqrt()).collect();
-            together += views.iter().sum::<f64>().powi(2) / VIEWS as f64;
-            each += views.iter().map(|x| x * x).sum::<f64>() / VIEWS as f64;
-        }
-        let s = Structure { variance_px2: 1.0 + PATTERN_PX.powi(2), ..Structure::default() };
-        let said = s.excess_of_pattern(
-            PATTERN_PX.powi(2),
-            FRAMES as f64,
-            VIEWS as f64,
-            &Correlation::white(),
-        );
-        assert!((said / (together / each) - 1.0).abs() < 0.04, "{said}, {}", together / each);
-    }
-}
+#[path = "structure_tests.rs"]
+mod tests;

@@ -38,7 +38,7 @@ use choose::Choice;
 use evidence::{Evidence, fit, gain};
 use layer_null::{Group, LayerNull};
 use outcome::{Chosen, Look, Outcome, bases, bases_where};
-use prepared::{Grouping, Patches, Prepared, Together, merged, prepare};
+use prepared::{Grouping, Patches, Prepared, Together, merge_by, prepare};
 use rows::Rows;
 use rules::Rules;
 use trial::{Judged, Trial, looks, nests};
@@ -231,25 +231,26 @@ impl<'a> Layer<'a> {
         let rules = self.rules.beside(chosen.len());
         let mut next =
             Choice { candidates, judged: &judged, rules: &rules, noise }.best(&beside)?;
-        if let Some(reach) = period::neighbours(candidates, &next.candidate) {
+        if let Some(bracket) = period::neighbours(candidates, &next.candidate) {
             let basis = next.candidate.basis.clone();
-            period::tune(reach, &mut next, self.total_beside(chosen, &basis));
+            period::tune(bracket, &mut next, self.total_beside(chosen, &basis));
         }
         Some(next)
     }
 
-    fn pinned(&self) -> Vec<&Basis> {
+    /// The pinned term, if any.
+    fn pinned_bases(&self) -> Vec<&Basis> {
         self.pinned.iter().map(|c| &c.candidate.basis).collect()
     }
 
     /// Joint gain of `terms`, given the pinned term.
     fn total(&self, terms: &[&Basis]) -> f64 {
-        self.given_pinned(&self.together.evidence(&[&self.pinned()[..], terms].concat()))
+        self.given_pinned(&self.together.evidence(&[&self.pinned_bases()[..], terms].concat()))
     }
 
     /// Gain of evidence on the pinned term and others, given the pinned term.
     fn given_pinned(&self, evidence: &[Evidence]) -> f64 {
-        let columns = self.pinned().iter().map(|b| b.count()).sum();
+        let columns = self.pinned_bases().iter().map(|b| b.count()).sum();
         let beside = Beside::of(evidence, columns, self.rules.prior);
         let gain = beside.and_then(|b| gain(&b.alone(evidence), self.rules.prior));
         gain.map_or(0.0, |g| g.total)
@@ -257,10 +258,10 @@ impl<'a> Layer<'a> {
 
     /// [`Layer::total`] of `chosen` and one more basis, quick for many over the coordinate of `like`.
     fn total_beside(&self, chosen: &[Chosen], like: &Basis) -> impl Fn(&Basis) -> f64 {
-        let beside = [self.pinned(), bases(chosen)].concat();
+        let beside = [self.pinned_bases(), bases(chosen)].concat();
         let views = self.together.fine.par_iter().zip(&self.groups);
         let merged: Vec<_> =
-            views.filter_map(|(view, g)| merged(view, g, like.alone()?, &beside)).collect();
+            views.filter_map(|(view, g)| merge_by(view, g, like.alone()?, &beside)).collect();
         move |basis| {
             if merged.is_empty() {
                 return self.total(&[&bases(chosen)[..], &[basis]].concat());

@@ -108,8 +108,8 @@ mod tests {
                 rivals: Vec::new(),
                 p: 1.0,
             };
-            let reach = neighbours(&candidates, &next.candidate).expect("several periods");
-            tune(reach, &mut next, total);
+            let bracket = neighbours(&candidates, &next.candidate).expect("several periods");
+            tune(bracket, &mut next, total);
             let (beta, covariance) = fit(&next.candidate.basis, &means);
             let reach = Extent { column: [0.0, COLUMNS as f64], ..Extent::default() };
             let fit = Fitted {

@@ -121,7 +121,7 @@ fn rows<'a>(view: &'a ViewData, response: &[f64], beside: &[&Basis]) -> Option<R
 }
 
 /// A view's rows beside these terms, merged by the grouping over this coordinate.
-pub fn merged<'a>(
+pub fn merge_by<'a>(
     view: &'a ViewData,
     groupings: &'a [Grouping],
     over: Coordinate,

@@ -143,7 +143,7 @@ impl<'a> Rows<'a> {
         let mut cross = DMatrix::<f64>::zeros(self.width + 1, sum.b.len() - m);
         let mut order: Vec<(usize, usize)> = self.used().map(|i| (block(i), i)).collect();
         order.sort_unstable();
-        let mut few = Few::of(cross.ncols());
+        let mut few = TouchedColumns::of(cross.ncols());
         for members in order.chunk_by(|a, b| a.0 == b.0) {
             few.fill(members.iter().map(|(_, i)| *i), &columns);
             let touched = &few.touched;
@@ -250,7 +250,7 @@ fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
 pub type Entries = Vec<(usize, f64)>;
 
 /// The columns that a block of samples touches.
-struct Few {
+struct TouchedColumns {
     /// Their indices, ascending.
     touched: Vec<usize>,
     /// Row-major, one row per sample.
@@ -260,10 +260,10 @@ struct Few {
     entries: Entries,
 }
 
-impl Few {
+impl TouchedColumns {
     fn of(columns: usize) -> Self {
         let (touched, rows, entries) = (Vec::new(), Vec::new(), Vec::new());
-        Few { touched, rows, place: vec![usize::MAX; columns], entries }
+        TouchedColumns { touched, rows, place: vec![usize::MAX; columns], entries }
     }
 
     fn fill(

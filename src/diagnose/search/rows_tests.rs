@@ -28,7 +28,7 @@ fn neighbourhoods_sum_to_what_single_samples_do() {
     let rows = Rows::new(&response, &weight, &beside, 2, &[0.5]).expect("a level");
     let plain = rows.reduce(NODES + 1, fill);
     for side in [1, 7, SAMPLES] {
-        // As often with the hats that are zero as without.
+        // The first half of the samples also lists hats that are zero.
         let columns = |i: usize, row: &mut Entries| {
             let mut whole = [0.0; NODES + 1];
             fill(i, &mut whole);

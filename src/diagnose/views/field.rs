@@ -190,7 +190,13 @@ impl Field {
         image
     }
 
-    /// Only these pixels, in a picture that ends where they do: an image of them is quicker to work on.
+    /// Same, high-passed.
+    pub fn high_passed(&self, values: &[f32]) -> Vec<f32> {
+        high_pass(&self.image(values), self.width, SMOOTH_PX)
+    }
+
+    /// Only these pixels, without plane or measurements, in a picture that ends where they do: images of it are
+    /// smaller.
     pub fn cut_to_target(&self) -> Field {
         let at = |i: u32| [i as usize % self.width, i as usize / self.width];
         let pixels = self.pixels.iter().map(|&i| at(i));
@@ -201,11 +207,6 @@ impl Field {
         let moved = pixels.map(|[u, v]| ((v - low[1]) * width + u - low[0]) as u32);
         let (pixels, step_px) = (moved.collect(), self.step_px);
         Field { width, height, pixels, step_px, ..Field::default() }
-    }
-
-    /// Same, high-passed.
-    pub fn high_passed(&self, values: &[f32]) -> Vec<f32> {
-        high_pass(&self.image(values), self.width, SMOOTH_PX)
     }
 
     /// Field of these pixels about a plane, without measurements or notes of the view.

@@ -186,8 +186,7 @@ impl Survey {
         for (view, (inflation, _)) in self.views.iter().zip(&anew) {
             let weight = view.whole_weight();
             before += weight;
-            after +=
-                weight * if *inflation > 0.0 { (view.inflation / inflation).max(1.0) } else { 1.0 };
+            after += weight * (view.inflation / inflation).max(1.0);
         }
         if after <= LITTLE * before {
             return false;
