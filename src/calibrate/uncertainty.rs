@@ -81,10 +81,14 @@ fn sigma_budget(
     Budget::of(sigma, components)
 }
 
-/// Derivative of the model's sigma by theta, m/rad.
+/// Derivative of the model's axial sigma by theta, m/rad; at an end of its domain from within, as sigma is constant
+/// beyond.
 fn slope_in_tilt(model: &SigmaModel, z: f64, theta: f64) -> f64 {
     const STEP_RAD: f64 = 1e-3;
-    (model.sigma(z, theta + STEP_RAD) - model.sigma(z, theta - STEP_RAD)) / (2.0 * STEP_RAD)
+    let [low, high] = model.domain.theta_rad;
+    let theta = theta.max(low).min(high);
+    let [a, b] = [(theta - STEP_RAD).max(low), (theta + STEP_RAD).min(high)];
+    if b > a { (model.axial_sigma(z, b) - model.axial_sigma(z, a)) / (b - a) } else { 0.0 }
 }
 
 fn conditions(views: &[(&ViewMeasurement, &View)]) -> Conditions {
@@ -103,5 +107,31 @@ fn conditions(views: &[(&ViewMeasurement, &View)]) -> Conditions {
         duration_s: last - first,
         temperature_c: stated(&|n| n.temperature_c),
         ambient_lux: stated(&|n| n.ambient_lux),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Direction, PAPER_EQ1};
+
+    /// Eq. 1's sigma across the plane, divided by cos(theta), differentiated by hand.
+    #[test]
+    fn the_slope_at_an_end_of_the_domain_is_the_formulas() {
+        let [a, b, c, d, e, f] = PAPER_EQ1;
+        let mut model = SigmaModel::paper();
+        model.domain.theta_rad = [0.2, 1.1];
+        for (theta, at) in [(0.7, 0.7), (1.1, 1.1), (1.3, 1.1), (0.2, 0.2), (0.0, 0.2)] {
+            let z: f64 = 2.0;
+            let (far, left) = (d * z.powf(e), f - at);
+            let across = a + b * (z - c).powi(2) + far * (at / left).powi(2);
+            let slope = far * 2.0 * at * f / left.powi(3);
+            let axial = match model.direction {
+                Direction::Axial => slope,
+                Direction::Perpendicular => (slope + across * at.tan()) / at.cos(),
+            };
+            let told = slope_in_tilt(&model, z, theta);
+            assert!((told / axial - 1.0).abs() < 0.01, "{told} at {theta}, by hand {axial}");
+        }
     }
 }

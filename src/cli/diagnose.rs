@@ -215,7 +215,7 @@ fn with_twins(
     let effects = Active::all_of_model(&effects).unwrap_or_default();
     let (rays, sigma) = (sensor.camera.rays(), &done.model.sigma);
     let camera = FormulaSensor { sensor, rays: &rays, sigma, effects: &effects, seed };
-    let session_s = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
+    let session_s = done.fields.first().map_or(0.0, |f| f.time_s - f.session_s);
     let retake = |index, field: &Field| {
         // Beside a simulated recording, the fields are already differences.
         if !done.against.is_empty() {

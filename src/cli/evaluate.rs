@@ -84,7 +84,7 @@ impl Arguments {
             Some(Offset::Auto) => match clock_offset(truth, estimate) {
                 Some(found) => Ok(found.seconds),
                 None => bail!(
-                    "--offset auto: the trajectories turn too little together to tell; give --offset in seconds"
+                    "--offset auto: no offset within half a second explains how both turn (which needs 30 motions of 0.1 s, from poses more often than 5 times a second, and true poses more often than 10 times); give --offset in seconds"
                 ),
             },
         }

@@ -5,7 +5,7 @@ use kinoise::fleet::{
     BiasOfUnit, Change, Comparison, ParameterOfUnit, SharedBias, SharedEffect, SharedSigma,
     Standing, UnitModel, compare,
 };
-use kinoise::units::counted;
+use kinoise::units::{counted, shortest, to_digits};
 
 use super::common::Global;
 use super::console::{notes, result};
@@ -140,12 +140,15 @@ fn report_effect(effect: &SharedEffect) {
     for parameter in &effect.parameters {
         let one = |u: &ParameterOfUnit| {
             let error = u.std_error.filter(|s| *s > 0.0);
-            let error = error.map_or(String::new(), |s| format!(" +- {s:.2}"));
-            format!("{} {:.3}{error}", u.unit, u.value)
+            let error =
+                error.map_or(String::new(), |s| format!(" +- {}", shortest(to_digits(s, 2))));
+            format!("{} {}{error}", u.unit, shortest(to_digits(u.value, 4)))
         };
         let units: Vec<String> = parameter.units.iter().map(one).collect();
         let shared = parameter.random_effects.map_or(String::new(), |r| {
-            format!("; in common {:.3}, units scatter {:.3}", r.common, r.scatter)
+            let [common, scatter] =
+                [(r.common, 4), (r.scatter, 2)].map(|(v, digits)| shortest(to_digits(v, digits)));
+            format!("; in common {common}, units scatter {scatter}")
         });
         let unit = Some(parameter.unit).filter(|u| !u.is_empty());
         let unit = unit.map_or(String::new(), |u| format!(", {u}"));

@@ -100,7 +100,7 @@ impl Correction {
     }
 
     /// Standard uncertainty of the corrected depths `depth_m` from the learnt shapes, m; NaN where there is
-    /// no depth. Errors that planes cannot show are not included.
+    /// no depth, infinite where the depth is. Errors that planes cannot show are not included.
     /// Fails if the image does not have the sensor's size.
     pub fn uncertainty_m(&self, depth_m: &[f32], conditions: &Conditions) -> Result<Vec<f32>> {
         self.refuse_size(depth_m)?;
@@ -115,12 +115,15 @@ impl Correction {
         let known = Known { conditions, factor: 1.0, slopes, pixels, terms, columns, tilt };
         let sigma = |parts: &mut Vec<f64>, (i, &z): (usize, &f32)| {
             let z = f64::from(z);
+            if z == f64::INFINITY {
+                return f32::INFINITY;
+            }
             if !(z > 0.0 && z.is_finite()) {
                 return f32::NAN;
             }
             let mut place = known.place(i);
             known.stand(&mut place, i, self.scale_px_m / z);
-            let px = self.uncertainty.variance(&place, parts).sqrt();
+            let px = self.uncertainty.variance(&place, conditions, parts).sqrt();
             (px * z * z / self.scale_px_m) as f32
         };
         Ok(depth_m.par_iter().enumerate().map_init(Vec::new, sigma).collect())

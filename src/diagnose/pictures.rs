@@ -47,7 +47,6 @@ pub fn pictures(
     let bench = Workbench::new(sensor, MeasureOptions::default());
     let mut known = KnownTerms::of(model, &sensor.camera);
     known.bias.extend(done.taken_out.iter().cloned());
-    let start = done.fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     worth_seeing(done)
         .into_par_iter()
         .map(|view| {
@@ -59,7 +58,7 @@ pub fn pictures(
             };
             let twin = retake(view, field).map(|frames| {
                 let frames = frames.into_iter();
-                let twin = field.with_frames(frames, &bench, &model.sigma, &known, start);
+                let twin = field.with_frames(frames, &bench, &model.sigma, &known);
                 stored(&twin, twin.mean.clone())
             });
             let mut left = done.read(view);

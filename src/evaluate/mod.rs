@@ -43,7 +43,11 @@ pub fn evaluate(truth: &[Pose], estimate: &[Pose], delta: Delta) -> Result<Evalu
             1e3 * o.std_error_s
         )
     });
-    let remarks = swapped(truth, estimate).into_iter().chain(told).collect();
+    let short = rpe::is_too_short(estimate, delta).then(|| {
+        "most intervals of --delta are shorter than half the time between two poses: a motion then ends where it begins, and counts as one without error; give a longer one"
+            .to_string()
+    });
+    let remarks = swapped(truth, estimate).into_iter().chain(told).chain(short).collect();
     Ok(Evaluation {
         ate: absolute(truth, estimate)?,
         rpe: relative(truth, estimate, delta)?,

@@ -56,6 +56,16 @@ fn frames_do_not_matter() {
     assert!((found.seconds - 0.03).abs() < 0.001, "{found:?}");
 }
 
+/// Some wrong offset within reach always fits better than its neighbours.
+#[test]
+fn an_offset_out_of_reach_is_not_told_as_another() {
+    let truth = looking_about(0.01, 0.0, 0.0, 0);
+    for (seed, offset) in (0..).zip([-5.0, -2.0, -0.7, 0.7, 1.5, 2.0, 3.0, 5.0]) {
+        let found = clock_offset(&truth, &looking_about(1.0 / 30.0, offset, 0.002, seed));
+        assert_eq!(found, None, "{offset}");
+    }
+}
+
 #[test]
 fn what_does_not_turn_says_nothing() {
     let still = |interval: f64| -> Vec<Pose> {

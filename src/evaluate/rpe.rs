@@ -82,6 +82,12 @@ fn too_short(delta: Delta) -> Error {
     }
 }
 
+/// Whether most intervals are so short that they end at the pose where they begin: motions without an error.
+pub(super) fn is_too_short(estimate: &[Pose], delta: Delta) -> bool {
+    let none = (0..estimate.len()).filter(|&i| partner(estimate, i, delta) == i);
+    2 * none.count() > estimate.len()
+}
+
 /// Index of the pose at the end of the interval that starts with pose `i`.
 fn partner(estimate: &[Pose], i: usize, delta: Delta) -> usize {
     match delta {

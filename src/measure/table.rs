@@ -88,7 +88,8 @@ fn rows_of(view: usize, m: &ViewMeasurement, kind: SigmaKind) -> Vec<SigmaRow> {
             let RansacPlane { z_m, theta_rad, sigma_m, .. } = p;
             SigmaRow { z_m, theta_rad, sigma_m, n_effective, view }
         };
-        return m.paper.into_iter().map(row).collect();
+        // Of coarse words the inliers may all be one.
+        return m.paper.into_iter().filter(|p| p.sigma_m > 0.0).map(row).collect();
     }
     let row = |cell: &Cell| {
         let (sigma_m, n) = match kind {
@@ -142,7 +143,8 @@ const COLUMNS: [Column; 30] = [
 /// Text of measurements.csv: one row per cell, in SI units, empty where a statistic is not available.
 pub fn write_measurements(views: &[ViewMeasurement]) -> String {
     // Writing to memory does not fail.
-    let mut table = ::csv::Writer::from_writer(Vec::new());
+    // A name that begins like a comment is quoted.
+    let mut table = ::csv::WriterBuilder::new().comment(Some(b'#')).from_writer(Vec::new());
     let _ = table.write_record(COLUMNS.map(|(name, _)| name));
     for (m, cell) in views.iter().flat_map(|m| m.cells.iter().map(move |cell| (m, cell))) {
         let _ = table.write_record(COLUMNS.map(|(_, value)| value(m, cell)));

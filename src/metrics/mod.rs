@@ -18,9 +18,8 @@ use serde::Serialize;
 use crate::Progress;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::io::FrameSource;
 use crate::measure::{
-    MeasureOptions, ViewMeasurement, Workbench, measure_view, ranges_remark, view_target,
+    MeasureOptions, TargetFrames, ViewMeasurement, Workbench, measure_view, ranges_remark,
     without_copies,
 };
 use crate::rng::Seed;
@@ -108,16 +107,13 @@ fn named(excluded: &Excluded) -> [String; 2] {
 }
 
 fn of_view(view: &View, bench: &Workbench<'_>) -> Result<(ViewMetrics, ViewMeasurement)> {
-    let target = view_target(view, bench)?;
+    let (target, shown) = TargetFrames::of(view, bench)?;
     let measured = measure_view(view, bench)?;
-    let camera = &bench.sensor.camera;
-    let mut source = FrameSource::new(camera.width, camera.height);
     let reference_distance_m = view.notes.reference_distance_m;
     let mut over_time = TemporalNoise::of(target.pixels.len());
     let mut frames = Vec::new();
-    for stored in &view.depth {
-        // What was measured has a remark on an unreadable frame.
-        let Ok(frame) = source.frame(stored) else { continue };
+    // What was measured has a remark on the frames that are left out.
+    for (_, frame) in shown {
         let code = &bench.sensor.code;
         let raw = target.pixels.iter().map(|&i| frame.raw[i as usize]);
         over_time.add(raw.map(|raw| code.metres(raw).map(|_| raw)));

@@ -105,7 +105,8 @@ pub fn plan_grid(
 }
 
 fn view(index: usize, pose: &GridView, scenery: &Scenery, frames: usize, seed: Seed) -> ViewPlan {
-    let start = index as f64 * VIEW_INTERVAL_S;
+    // Views follow one another, however long they are.
+    let start = index as f64 * VIEW_INTERVAL_S.max(frames as f64 / RATE_HZ);
     // Drawn whether or not an effect uses it. Whole lx, as a light meter shows.
     let [dim, bright] = AMBIENT_LUX.map(f64::ln);
     let mut light = seed.stream(&format!("simulate/ambient/{index}"));

@@ -49,7 +49,6 @@ pub fn referenced_views(
     bias: &[Term],
     known: &KnownTerms,
 ) -> Vec<ReferencedView> {
-    let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     let levels = rms::levels(survey, bias);
     let views = fields.par_iter().zip(&survey.views).zip(levels);
     views
@@ -57,7 +56,7 @@ pub fn referenced_views(
             let reference_m = f.reference_distance_m?;
             // The plane was bent towards what is now known to be a bias.
             let measured = f.scale_px_m / (f.scale_px_m * f.plane.q.z + level);
-            let session_s = f.time_s - start;
+            let session_s = f.session_s;
             let z = measured - known.law_m(measured, session_s, f.scale_px_m);
             let m_a_px = z * z / f.scale_px_m;
             let steep = f.plane.theta().tan();

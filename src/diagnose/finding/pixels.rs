@@ -183,11 +183,10 @@ pub(in crate::diagnose) fn pixel_terms(
         return Vec::new();
     }
     let (still, others) = Still::of(terms, bench);
-    let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
     fields
         .par_iter()
         .map(|f| {
-            let of_view = || Places::of(f, &bench.sensor.camera, &bench.rays, start);
+            let of_view = || Places::of(f, &bench.sensor.camera, &bench.rays);
             let places = (!others.is_empty()).then(of_view);
             (0..f.pixels.len())
                 .map(|k| {
@@ -245,7 +244,7 @@ mod tests {
         let pixels: Vec<u32> = (0..(camera.width * camera.height) as u32).step_by(37).collect();
         let mut field = Field::unseen(Plane::tilted(1.5, 0.9, 0.4), 43.5, size, pixels);
         field.edge = vec![9.0; field.pixels.len()];
-        let places = Places::of(&field, camera, &bench.rays, 0.0);
+        let places = Places::of(&field, camera, &bench.rays);
         for k in 0..field.pixels.len() {
             let truth = Term::sum(&terms[..STILL], &places.pixel(k));
             let disparity = field.disparity(k, &bench.rays);

@@ -26,10 +26,9 @@ impl Field {
         bench: &Workbench<'_>,
         sigma: &SigmaModel,
         known: &KnownTerms,
-        session_start: f64,
     ) {
         self.sigma = self.expected_sigma(&bench.rays, sigma);
-        let mut expected = self.known_bias(known, bench, session_start);
+        let mut expected = self.known_bias(known, bench);
         let mut clip_px = self.spread_px;
         let mut edges = Edges::default();
         for (time, image) in frames {
@@ -74,7 +73,7 @@ impl Field {
     }
 
     /// Disparity that the model expects at each pixel, px. Its variance terms scale `sigma`.
-    fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>, start: f64) -> Vec<f32> {
+    fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>) -> Vec<f32> {
         let n = self.pixels.len();
         let mut expected: Vec<f32> =
             (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
@@ -82,7 +81,7 @@ impl Field {
             return expected;
         }
         let mut sigma = self.sigma.clone();
-        let places = Places::of(self, &bench.sensor.camera, &bench.rays, start);
+        let places = Places::of(self, &bench.sensor.camera, &bench.rays);
         for k in 0..n {
             let place = places.pixel(k);
             expected[k] += Term::sum(&known.bias, &place) as f32;
@@ -94,7 +93,7 @@ impl Field {
 
     /// Bias subtracted from each pixel while reading, px: the column steps and these terms.
     pub fn taken_out(&self, terms: &[Term], bench: &Workbench<'_>) -> Vec<f32> {
-        let places = Places::of(self, &bench.sensor.camera, &bench.rays, self.time_s);
+        let places = Places::of(self, &bench.sensor.camera, &bench.rays);
         let of_terms = |k| Term::sum(terms, &places.pixel(k)) as f32;
         let of_pixel = |(k, &i): (usize, &u32)| self.column_error(i) + of_terms(k);
         self.pixels.iter().enumerate().map(of_pixel).collect()

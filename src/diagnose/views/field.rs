@@ -24,6 +24,8 @@ pub struct Field {
     pub name: String,
     /// Time on the recording's clock, s.
     pub time_s: f64,
+    /// The same since the recording's first frame, of whatever view, s.
+    pub session_s: f64,
     pub plane: Plane,
     /// fx * baseline, px m.
     pub scale_px_m: f64,
@@ -109,6 +111,7 @@ impl Field {
         let mut field = Field {
             name: view.name.clone(),
             time_s: start,
+            session_s: start - session_start,
             spread_px: (target.scale * scale_px_m) as f32,
             reference_distance_m: notes.reference_distance_m,
             flatness_m: notes.target.and_then(|t| t.flatness_m),
@@ -118,7 +121,7 @@ impl Field {
             ..Field::unseen(target.plane, scale_px_m, size, target.pixels)
         };
         let timed = frames.by_ref().map(|(k, frame)| (view.depth[k].timestamp - start, frame));
-        field.accumulate(timed, bench, sigma, known, session_start);
+        field.accumulate(timed, bench, sigma, known);
         field.left_out = frames.left_out();
         field.read_infrared(view, &bench.rays);
         Ok(field)
@@ -131,11 +134,10 @@ impl Field {
         bench: &Workbench<'_>,
         sigma: &SigmaModel,
         known: &KnownTerms,
-        session_start: f64,
     ) -> Self {
         let mut field = self.clone();
         field.forget();
-        field.accumulate(frames, bench, sigma, known, session_start);
+        field.accumulate(frames, bench, sigma, known);
         field
     }
 

@@ -82,7 +82,6 @@ impl Survey {
     /// `step` is that of the stored words.
     pub fn of(fields: &[Field], bench: &Workbench<'_>, step: Option<Step>) -> Self {
         let camera = &bench.sensor.camera;
-        let start = fields.iter().map(|f| f.time_s).fold(f64::INFINITY, f64::min);
         let poses: Vec<(f64, f64)> =
             fields.iter().map(|f| (f.plane.distance(), f.plane.theta())).collect();
         let mut views: Vec<SurveyedView> = fields
@@ -90,7 +89,7 @@ impl Survey {
             .zip(inflations(fields, &[]))
             .zip(halves(&poses))
             .map(|((f, (inflation, correlation)), in_second_half)| {
-                let (places, tiles) = tiles(f, camera, &bench.rays, start);
+                let (places, tiles) = tiles(f, camera, &bench.rays);
                 SurveyedView {
                     name: f.name.clone(),
                     places: Arc::new(places),

@@ -73,11 +73,10 @@ pub struct Places<'a> {
 }
 
 impl<'a> Places<'a> {
-    /// `session_start` on the recording's clock, s.
-    pub fn of(field: &'a Field, camera: &'a Camera, rays: &'a Rays, session_start: f64) -> Self {
+    pub fn of(field: &'a Field, camera: &'a Camera, rays: &'a Rays) -> Self {
         let mut view = PixelContext {
             side: SIDE as f64,
-            session_s: field.time_s - session_start,
+            session_s: field.session_s,
             ambient: field.ambient_lux.unwrap_or(0.0),
             temperature_c: field.temperature_c.unwrap_or(0.0),
             light: 1.0,
@@ -127,13 +126,8 @@ impl<'a> Places<'a> {
 }
 
 /// Places and tiles of a view.
-pub fn tiles(
-    field: &Field,
-    camera: &Camera,
-    rays: &Rays,
-    session_start: f64,
-) -> (Vec<PixelContext>, Vec<Tile>) {
-    let places = Places::of(field, camera, rays, session_start);
+pub fn tiles(field: &Field, camera: &Camera, rays: &Rays) -> (Vec<PixelContext>, Vec<Tile>) {
+    let places = Places::of(field, camera, rays);
     let across = camera.width.div_ceil(SIDE);
     let rows = camera.height.div_ceil(SIDE);
     let mut sums = vec![Sums::default(); across * rows];

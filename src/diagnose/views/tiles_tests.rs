@@ -45,7 +45,7 @@ fn field(camera: &Camera, kept: f64) -> Field {
 fn lost_readings_make_the_noise_no_smaller() {
     let camera = kinect_v1(1).camera;
     for kept in [1.0, 0.5, 0.2] {
-        let (_, tiles) = tiles(&field(&camera, kept), &camera, &camera.rays(), 0.0);
+        let (_, tiles) = tiles(&field(&camera, kept), &camera, &camera.rays());
         let seen = tiles.iter().filter(|t| t.temporal.is_finite());
         let sums = seen.fold([0.0; 2], |[square, n], t| {
             let counts = t.pixels * t.repeated;

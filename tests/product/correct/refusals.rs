@@ -93,10 +93,19 @@ fn the_uncertainty_of_a_correction_is_its_covariance() {
         covariance: Some(Covariance { fit, factors, variances }),
         ..shaped(UNEXPLAINED, vec![shape])
     };
+    let over_temperature = Basis::Curve {
+        over: Coordinate::Temperature,
+        low: 20.0,
+        high: 40.0,
+        nodes: 2,
+        times: Modulation::One,
+    };
     let effects = vec![
         of(still(0.01), 1, vec![vec![0.2], vec![0.0]], vec![]),
         of(grows(0.01), 1, vec![vec![-0.1], vec![0.3]], vec![]),
         of(still(0.01), 2, vec![], vec![0.04]),
+        // Not subtracted where the temperature is unknown, as here.
+        of(bias(over_temperature, &[0.5, 1.0]), 3, vec![], vec![0.5, 0.5]),
     ];
     let sensor = sensor();
     let correction =
@@ -117,6 +126,9 @@ fn the_uncertainty_of_a_correction_is_its_covariance() {
     let nothing = vec![f32::NAN; camera.pixels()];
     let told = correction.uncertainty_m(&nothing, &Conditions::default()).expect("its size");
     assert!(told.iter().all(|u| u.is_nan()));
+    let endless = vec![f32::INFINITY; camera.pixels()];
+    let told = correction.uncertainty_m(&endless, &Conditions::default()).expect("its size");
+    assert!(told.iter().all(|u| *u == f32::INFINITY));
     assert!(correction.uncertainty_m(&depth[1..], &Conditions::default()).is_err());
 
     let files = Files::new();
