@@ -8,7 +8,7 @@ use super::slopes::Slopes;
 use crate::error::{Error, Result};
 use crate::measure::ColumnSteps;
 use crate::plane::Plane;
-use crate::terms::{LearntTerm, PixelContext, Pixels, ROOM_LUX};
+use crate::terms::{LearntTerm, PixelContext, Pixels, ROOM_LUX, Term};
 
 /// Change of the disparity at which the fixed-point iteration stops, px. Terms are evaluated at the corrected
 /// disparity. The remaining error is smaller by the slope of the terms, 0.01 for a few tenths of a px over
@@ -123,7 +123,8 @@ impl Correction {
             }
             let mut place = known.place(i);
             known.stand(&mut place, i, self.scale_px_m / z);
-            let px = self.uncertainty.variance(&place, conditions, parts).sqrt();
+            let subtracted = |term: &Term| conditions.determine(term);
+            let px = self.uncertainty.variance(&place, subtracted, parts).sqrt();
             (px * z * z / self.scale_px_m) as f32
         };
         Ok(depth_m.par_iter().enumerate().map_init(Vec::new, sigma).collect())

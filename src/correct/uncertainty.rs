@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::correction::Conditions;
 use crate::model;
 use crate::terms::{ANYWHERE, Basis, Modulation, Needs, PixelContext, Term};
 
@@ -76,18 +75,18 @@ impl Uncertainty {
         self.shapes.is_empty()
     }
 
-    /// Variance at a place, px^2, of the shapes that are subtracted under these conditions. `parts` is scratch space.
+    /// Variance at a place, px^2, of the terms that are `subtracted` there. `parts` is scratch space.
     pub fn variance(
         &self,
         place: &PixelContext,
-        conditions: &Conditions,
+        subtracted: impl Fn(&Term) -> bool,
         parts: &mut Vec<f64>,
     ) -> f64 {
         parts.clear();
         parts.resize(self.parts.len(), 0.0);
         let mut own = 0.0;
-        let subtracted = self.shapes.iter().filter(|shape| conditions.determine(&shape.term.0));
-        for Spread { term: (term, learnt), parts: mine, own: variances } in subtracted {
+        let shapes = self.shapes.iter().filter(|shape| subtracted(&shape.term.0));
+        for Spread { term: (term, learnt), parts: mine, own: variances } in shapes {
             term.basis.visit(&term.basis.held(*learnt, place), |j, g| {
                 mine.iter().for_each(|(part, coefficients)| parts[*part] += g * coefficients[j]);
                 own += variances.get(j).map_or(0.0, |variance| g * g * variance);
