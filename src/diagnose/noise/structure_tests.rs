@@ -128,3 +128,20 @@ fn a_target_has_the_same_structure_wherever_it_is_seen() {
         |s: &Structure| (s.pixels, s.variance_px2, s.lagged, s.row_px2, s.correlation_profile);
     assert_eq!(told(&here), told(&there));
 }
+
+/// The longest lag is 54 px.
+#[test]
+fn a_target_narrower_than_the_lags_has_a_structure() {
+    for [width, height] in [[16, 110], [40, 110], [110, 40], [40, 16]] {
+        let mut rng = Seed(8).stream("structure/narrow");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let pixels = (0..height).flat_map(|v| (v * 160..).take(width));
+        let mut field =
+            Field::unseen(Plane::default(), 40.0, [160, 120], pixels.map(|i| i as u32).collect());
+        let n = field.pixels.len();
+        field.first = (0..4).map(|_| (0..n).map(|_| normal() as f32).collect()).collect();
+        field.sigma = vec![1.0; n];
+        let (s, _) = structure(&field, &[]);
+        assert!(s.variance_px2 > 0.5 && s.lagged.iter().all(Option::is_some), "{width} x {height}");
+    }
+}

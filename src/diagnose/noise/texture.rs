@@ -180,6 +180,9 @@ pub fn covariance(image: &Filled, width: usize, lags: &[usize], step: [usize; 2]
     for lag in lags {
         let (du, dv) = (lag * step[0], lag * step[1]);
         let across = w.saturating_sub(du);
+        if across == 0 {
+            continue;
+        }
         for v in 0..h.saturating_sub(dv) {
             let near = v * w..v * w + across;
             let far = (v + dv) * w + du..(v + dv) * w + du + across;
