@@ -184,6 +184,12 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Time of the first depth frame of any view, s: where the session's clock begins.
+    pub fn start_s(&self) -> f64 {
+        let frames = self.views.iter().flat_map(|v| &v.depth);
+        frames.map(|f| f.timestamp).fold(f64::INFINITY, f64::min)
+    }
+
     /// Applies `of` to all views in parallel. Returns the results in order, and the excluded views: those
     /// excluded before, then those for which `of` failed. `progress` counts views.
     pub fn each_view<'a, T: Send>(

@@ -53,7 +53,7 @@ pub(super) struct Image {
 /// The depth images with their conditions, each once even if several lists name it.
 pub(super) fn images(recording: &Recording, root: &Path) -> Result<Vec<Image>> {
     let frames = || recording.views.iter().flat_map(|v| v.depth.iter().map(move |f| (v, f)));
-    let begin = frames().map(|(_, f)| f.timestamp).fold(f64::INFINITY, f64::min);
+    let begin = recording.start_s();
     let (mut known, mut images) = (HashSet::new(), Vec::new());
     for (view, frame) in frames() {
         let file = match &frame.within {

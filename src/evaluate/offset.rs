@@ -77,7 +77,7 @@ pub fn clock_offset(truth: &[Pose], estimate: &[Pose]) -> Option<ClockOffset> {
         seconds -= step;
     }
     let fit = Fit::at(truth, &turns, seconds)?;
-    if fit.misfit() > FITS * fit.turned {
+    if fit.misfit() > FITS * fit.turned(truth) {
         return None;
     }
     let (_, information, scatter) = fit.equations(truth);
@@ -123,8 +123,6 @@ fn rotation_at(truth: &[Pose], stamp: f64) -> Option<UnitQuaternion<f64>> {
 struct Fit<'a> {
     offset: f64,
     turns: Vec<&'a Turn>,
-    /// Median true rotation, rad.
-    turned: f64,
     /// Residuals: true rotation minus the estimated one in the truth's frame.
     left: Vec<Vector3<f64>>,
 }
@@ -140,13 +138,19 @@ impl<'a> Fit<'a> {
         let spread = pairs.iter().map(|(t, w)| w * t.vector.transpose()).sum();
         let into = nearest_rotation(&spread)?;
         let left = pairs.iter().map(|(t, w)| w - into * t.vector).collect();
-        let turned = median(&mut pairs.iter().map(|(_, w)| w.norm()).collect::<Vec<f64>>());
-        Some(Fit { offset, turned, turns: pairs.into_iter().map(|p| p.0).collect(), left })
+        Some(Fit { offset, turns: pairs.into_iter().map(|p| p.0).collect(), left })
     }
 
     /// Median residual, rad; robust against lost frames.
     fn misfit(&self) -> f64 {
         median(&mut self.left.iter().map(Vector3::norm).collect::<Vec<f64>>())
+    }
+
+    /// Median true rotation, rad.
+    fn turned(&self, truth: &[Pose]) -> f64 {
+        let of = |t: &&Turn| true_turn(truth, t.from + self.offset, t.to + self.offset);
+        let all = self.turns.iter().filter_map(of).map(|w| w.norm());
+        median(&mut all.collect::<Vec<f64>>())
     }
 
     /// Score and information of the offset, and the variance of the score from its scatter between the parts.

@@ -60,6 +60,11 @@ pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (n > 0.0).then(|| sum / n)
 }
 
+/// Mean square of the finite values, if any.
+pub fn mean_square<'a>(values: impl IntoIterator<Item = &'a f32>) -> Option<f64> {
+    mean(values.into_iter().map(|v| f64::from(*v).powi(2)))
+}
+
 /// Median by selection, the upper of two middle values; NaN when empty. The slice is reordered.
 pub fn median_in_place(values: &mut [f32]) -> f32 {
     let n = values.len();

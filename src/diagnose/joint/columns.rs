@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::camera::Camera;
 use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::outcome::Chosen;
-use crate::diagnose::search::prepared::{append_all, fill_all};
-use crate::diagnose::search::rows::Entries;
+use crate::diagnose::search::prepared::{fill_all, visit_all};
+use crate::diagnose::search::touched::Entries;
 use crate::diagnose::views::samples::ViewData;
 use crate::terms::{Basis, Gauge, Modulation, PixelContext, Pixels};
 
@@ -131,10 +131,11 @@ impl Columns {
 
     /// Appends the columns that may be nonzero at a place, affine parts included.
     fn append(&self, place: &PixelContext, row: &mut Entries) {
-        append_all(&self.bases, place, 0, row);
-        append_all(&self.maps, place, self.terms, row);
-        for (k, &times) in self.absorbed_times.iter().enumerate() {
-            append_all(&[Basis::Affine { times }], place, self.absorbed.ncols() + 3 * k, row);
+        visit_all(&self.bases, place, |k, g| row.push((k, g)));
+        visit_all(&self.maps, place, |k, g| row.push((self.terms + k, g)));
+        for (n, &times) in self.absorbed_times.iter().enumerate() {
+            let first = self.absorbed.ncols() + 3 * n;
+            Basis::Affine { times }.visit(place, |k, g| row.push((first + k, g)));
         }
     }
 

@@ -18,14 +18,17 @@ const DOUBTFUL: f64 = 0.05;
 /// Error of a constant share beside one that changes slowly.
 const BESIDE_ANOTHER: f64 = 0.05;
 
-/// Finding of a correlation of frames: a share of the variance.
+/// Finding of a correlation of these views' frames: a share of the noise before rounding.
 fn of_frames(
+    views: &[Structure],
     families: Vec<&'static str>,
     interval: [f64; 2],
     (name, share, std_error): (&str, f64, f64),
     size: f64,
     (p, nats): (f64, f64),
 ) -> TextureFinding {
+    // Sizes are those of the stored words, rounding included.
+    let size = size * mean(views.iter().map(|s| 1.0 - s.rounding)).unwrap_or(1.0);
     TextureFinding {
         interval,
         parameters: one(name, share, std_error),
@@ -76,11 +79,6 @@ fn beside(
 ) -> Vec<TextureFinding> {
     let mut found = Vec::new();
     let Some(first) = views.mean(next) else { return found };
-    let of_frames = |families, interval, parameter, share: f64, evidence| {
-        // Sizes are those of the stored words, rounding included.
-        let stored = mean(views.views.iter().map(|s| 1.0 - s.rounding)).unwrap_or(1.0);
-        of_frames(families, interval, parameter, share * stored, evidence)
-    };
     let first = first.and_error(of_pattern);
     let first_error = first.std_error.max(by_chance(views.views));
     let frozen_known = known.parameter("frozen-noise", "fraction").unwrap_or(0.0);
@@ -93,7 +91,8 @@ fn beside(
         if p < level {
             let names = vec!["frozen-noise", "temporal-correlation"];
             let fraction = ("fraction", first.value, first_error);
-            found.push(of_frames(names, [0.0, 1.0], fraction, more, (p, nats(&first, 0.0))));
+            let evidence = (p, nats(&first, 0.0));
+            found.push(of_frames(views.views, names, [0.0, 1.0], fraction, more, evidence));
         }
         return found;
     };
@@ -113,7 +112,14 @@ fn beside(
         let rho = ((first.value - s) / (1.0 - s).max(1e-6)).clamp(0.0, 1.0);
         let name = vec!["temporal-correlation"];
         let evidence = (p_falling, nats(&falling, 0.0));
-        found.push(of_frames(name, [1.0, 3.0], ("rho", rho, first_error), rho, evidence));
+        found.push(of_frames(
+            views.views,
+            name,
+            [1.0, 3.0],
+            ("rho", rho, first_error),
+            rho,
+            evidence,
+        ));
     }
     if stands {
         // An uncertain fall may as well be slow change.
@@ -130,7 +136,7 @@ fn beside(
             "frozen-noise" => ("fraction", still, standing.std_error),
             _ => ("rho", (first.value - frozen_known).max(0.0), first_error),
         };
-        found.push(of_frames(names, [1.0, 3.0], parameter, still, evidence));
+        found.push(of_frames(views.views, names, [1.0, 3.0], parameter, still, evidence));
     }
     found
 }

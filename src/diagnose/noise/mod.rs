@@ -237,7 +237,7 @@ pub fn still_errors(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<
         (Axis::Row, "each row has a constant error of its own, unlike its neighbours'"),
         (Axis::Pixel, "a fine pattern over the picture is the same in all views"),
     ];
-    let still = still.into_iter().enumerate().filter_map(|(k, (axis, words))| {
+    let found = still.into_iter().enumerate().filter_map(|(k, (axis, words))| {
         let of = |s: &Still| [s.lines_px2[0], s.lines_px2[1], s.blotches_px2][k];
         let by_pattern = ViewMean::of(views, |s| Some(s.still.by_pattern_px2[k]));
         let m = ViewMean::of_pairs(views, |s| of(&s.still))?;
@@ -250,7 +250,7 @@ pub fn still_errors(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<
         let found = plain.shared(&m, known.error_of_lines_px2(axis), variance, level / 3.0)?;
         Some(TextureFinding { p: 3.0 * found.p, ..found })
     });
-    still.collect()
+    found.collect()
 }
 
 #[cfg(test)]

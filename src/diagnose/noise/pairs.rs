@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3, Vector5};
 use super::texture::without_outliers;
 use crate::diagnose::views::box_sums::over_boxes;
 use crate::solve::plane_equations;
-use crate::stats::mean;
+use crate::stats::mean_square;
 
 /// Reach of the neighbourhood, px.
 pub const REACH_PX: usize = 4;
@@ -18,8 +18,8 @@ pub const REACH_PX: usize = 4;
 /// information of all lags; with equal weights, one of 3 px shows 23 % and those of 7 to 9 px up to 76 % in place
 /// of 60 %.
 const OUTER_WEIGHT: f64 = 0.25;
-/// Lengths of a line's blocks, px; the second divides the first. Pixels of touching blocks may share a window; where the noise has none,
-/// the short ones keep more pairs.
+/// Lengths of a line's blocks, px; the second divides the first. Pixels of touching blocks may share a window;
+/// where the noise has none, the short ones keep more pairs.
 const BLOCKS_PX: [usize; 2] = [16, 4];
 /// Fewest pairs for an estimate.
 const MIN_PAIRS: f64 = 1000.0;
@@ -53,7 +53,7 @@ impl Pairs {
         let level = without_outliers(&level, step_px);
         let height = level.len() / width;
         let pixels = level.iter().filter(|r| r.is_finite()).count() as f64;
-        let power = mean(level.iter().map(|r| f64::from(*r).powi(2)))?;
+        let power = mean_square(&level)?;
         let beside = neighbours(&level, width, REACH_PX);
         if beside.pairs < MIN_PAIRS {
             return None;

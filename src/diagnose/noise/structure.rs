@@ -12,10 +12,10 @@ use super::texture::{
     frame_log_variance, moving, same_pixel, without_lines,
 };
 use crate::diagnose::options::FRAMES_KEPT;
-use crate::diagnose::steps::rounding::rounded_alike;
+use crate::diagnose::steps::rounding::{rounded_alike, share_of_rounding};
 use crate::diagnose::views::box_sums::repeats_of_box;
 use crate::diagnose::views::field::Field;
-use crate::stats::{Correlation, LONGEST_LAG, mean};
+use crate::stats::{Correlation, LONGEST_LAG, mean, mean_square};
 
 /// Statistics of one view; `None` where it cannot show them.
 #[derive(Debug, Clone, Default)]
@@ -79,7 +79,7 @@ impl Structure {
     fn of_image(image: &[f32]) -> Self {
         Structure {
             pixels: image.iter().filter(|r| r.is_finite()).count() as f64,
-            variance_px2: mean(image.iter().map(|&r| f64::from(r).powi(2))).unwrap_or(0.0),
+            variance_px2: mean_square(image).unwrap_or(0.0),
             ..Structure::default()
         }
     }
@@ -167,9 +167,6 @@ impl Structure {
     }
 }
 
-/// Largest share of the variance that is taken for rounding.
-const MAX_ROUNDING: f64 = 0.5;
-
 /// A view's structure, and what its lines share by pairs in short blocks.
 pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let cut = field.cut_to_target();
@@ -179,10 +176,9 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let mut s = Structure { step_px: field.step_px, ..Structure::of_image(first) };
     let level: Vec<Vec<f32>> =
         frames.iter().map(|f| without_lines(f, cut.width, SHORT_LINE)).collect();
-    let left_px2 = Structure::of_image(&level[0]).variance_px2;
+    let left_px2 = mean_square(&level[0]).unwrap_or(0.0);
     s.lines_px2 = (s.variance_px2 - left_px2).max(0.0);
-    // Where the noise is small against a step, a pixel's rounding error hardly changes from frame to frame.
-    s.rounding = (s.step_px.powi(2) / 12.0 / left_px2.max(1e-12)).min(MAX_ROUNDING);
+    s.rounding = share_of_rounding(s.step_px, left_px2);
     let rounded = rounded_alike(field);
     for lag in 1..frames.len().min(4) {
         let pairs = (0..frames.len() - lag).map(|k| same_pixel(&level[k], &level[k + lag]));
@@ -260,7 +256,7 @@ fn correlation_profile(
     };
     // The high-pass leaves a little correlation everywhere: what the diagonal shows is not a window's.
     let apart = over(&FAR, [1, 1])?;
-    let power = mean(changes.iter().flatten().map(|&r| f64::from(r).powi(2)))?;
+    let power = mean_square(changes.iter().flatten())?;
     let power = beside_lines(power, [row, column]);
     let at = |lag: usize| {
         let along = |step, line: f64| Some(over(&[lag], step)? - apart - line.max(0.0));

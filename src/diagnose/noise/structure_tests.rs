@@ -6,6 +6,15 @@ use super::*;
 use crate::plane::Plane;
 use crate::rng::Seed;
 
+/// Four frames of a target with these pixels, `value` at the pixel of each index.
+fn seen(sides: [usize; 2], pixels: Vec<u32>, mut value: impl FnMut(usize) -> f64) -> Field {
+    let mut field = Field::unseen(Plane::default(), 40.0, sides, pixels);
+    let n = field.pixels.len();
+    field.first = (0..4).map(|_| (0..n).map(|k| value(k) as f32).collect()).collect();
+    field.sigma = vec![1.0; n];
+    field
+}
+
 /// Frames of a tilted plane in words of one step, half of whose noise is the same in all: the share is that of
 /// the noise, whatever rounding adds. Twelve views give it to .002.
 #[test]
@@ -18,15 +27,13 @@ fn rounding_lowers_no_share_that_stands_still() {
             let mut rng = Seed(seed).stream("structure/rounding");
             let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
             let pixels: Vec<u32> = (0..(SIDE * SIDE) as u32).collect();
-            let sides = [SIDE, SIDE];
-            let mut field = Field::unseen(Plane::default(), 40.0, sides, pixels);
             let still: Vec<f64> = (0..SIDE * SIDE).map(|_| STILL.sqrt() * normal()).collect();
-            let mut word = |i: usize| {
+            let word = |i: usize| {
                 let plane = 0.137 * (i % SIDE) as f64 + 0.071 * (i / SIDE) as f64;
                 let noise = still[i] + (1.0 - STILL).sqrt() * normal();
-                (STEP_PX * ((plane + steps * noise).round() - plane)) as f32
+                STEP_PX * ((plane + steps * noise).round() - plane)
             };
-            field.first = (0..4).map(|_| (0..SIDE * SIDE).map(&mut word).collect()).collect();
+            let mut field = seen([SIDE; 2], pixels, word);
             let variance = STEP_PX.powi(2) * (steps.powi(2) + 1.0 / 12.0);
             field.sigma = vec![variance.sqrt() as f32; SIDE * SIDE];
             field.step_px = STEP_PX;
@@ -112,10 +119,7 @@ fn a_target_has_the_same_structure_wherever_it_is_seen() {
         // A corner of the target is missing.
         let pixels = (0..SIDE).flat_map(|v| (of_row(v)..of_row(v) + SIDE).skip(v / 4));
         let pixels: Vec<u32> = pixels.map(|i| i as u32).collect();
-        let n = pixels.len();
-        let mut field = Field::unseen(Plane::default(), 40.0, [width, height], pixels);
-        field.first = (0..4).map(|_| (0..n).map(|_| normal() as f32).collect()).collect();
-        field.sigma = vec![1.0; n];
+        let field = seen([width, height], pixels, |_| normal());
         let cut = field.cut_to_target();
         let kept: Vec<f32> =
             cut.image(&field.first[0]).into_iter().filter(|r| r.is_finite()).collect();
@@ -136,11 +140,8 @@ fn a_target_narrower_than_the_lags_has_a_structure() {
         let mut rng = Seed(8).stream("structure/narrow");
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let pixels = (0..height).flat_map(|v| (v * 160..).take(width));
-        let mut field =
-            Field::unseen(Plane::default(), 40.0, [160, 120], pixels.map(|i| i as u32).collect());
-        let n = field.pixels.len();
-        field.first = (0..4).map(|_| (0..n).map(|_| normal() as f32).collect()).collect();
-        field.sigma = vec![1.0; n];
+        let pixels = pixels.map(|i| i as u32).collect();
+        let field = seen([160, 120], pixels, |_| normal());
         let (s, _) = structure(&field, &[]);
         assert!(s.variance_px2 > 0.5 && s.lagged.iter().all(Option::is_some), "{width} x {height}");
     }

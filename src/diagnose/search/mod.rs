@@ -19,6 +19,7 @@ pub mod prepared;
 mod revise;
 pub mod rows;
 pub mod rules;
+pub mod touched;
 mod trial;
 pub mod variance;
 pub mod view_levels;
@@ -31,7 +32,7 @@ use rayon::prelude::*;
 
 use crate::diagnose::views::samples::ViewData;
 use crate::rng::Seed;
-use crate::terms::{Basis, Term};
+use crate::terms::{Basis, Coordinate, Term};
 use beside::Beside;
 use candidate::Candidate;
 use choose::Choice;
@@ -232,8 +233,8 @@ impl<'a> Layer<'a> {
         let mut next =
             Choice { candidates, judged: &judged, rules: &rules, noise }.best(&beside)?;
         if let Some(bracket) = period::neighbours(candidates, &next.candidate) {
-            let basis = next.candidate.basis.clone();
-            period::tune(bracket, &mut next, self.total_beside(chosen, &basis));
+            let over = next.candidate.basis.alone();
+            period::tune(bracket, &mut next, self.total_beside(chosen, over));
         }
         Some(next)
     }
@@ -256,19 +257,17 @@ impl<'a> Layer<'a> {
         gain.map_or(0.0, |g| g.total)
     }
 
-    /// [`Layer::total`] of `chosen` and one more basis, quick for many over the coordinate of `like`.
-    fn total_beside(&self, chosen: &[Chosen], like: &Basis) -> impl Fn(&Basis) -> f64 {
+    /// [`Layer::total`] of `chosen` and one more basis, quick for many that depend on a coordinate alone.
+    fn total_beside(&self, chosen: &[Chosen], over: Option<Coordinate>) -> impl Fn(&Basis) -> f64 {
         let beside = [self.pinned_bases(), bases(chosen)].concat();
         let views = self.together.fine.par_iter().zip(&self.groups);
         let merged: Vec<_> =
-            views.filter_map(|(view, g)| merge_by(view, g, like.alone()?, &beside)).collect();
+            views.filter_map(|(view, g)| merge_by(view, g, over?, &beside)).collect();
         move |basis| {
             if merged.is_empty() {
                 return self.total(&[&bases(chosen)[..], &[basis]].concat());
             }
-            let of_view = |(g, rows): &(&Grouping, Rows<'_>)| {
-                rows.reduce(basis.count(), |i, row| basis.fill(&g.places[i], row))
-            };
+            let of_view = |(g, rows): &(&Grouping, Rows<'_>)| rows.evidence(basis, &g.places);
             self.given_pinned(&merged.iter().map(of_view).collect::<Vec<Evidence>>())
         }
     }

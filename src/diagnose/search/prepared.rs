@@ -8,7 +8,7 @@ use std::rc::Rc;
 use rayon::prelude::*;
 
 use super::evidence::Evidence;
-use super::rows::{Entries, Rows};
+use super::rows::Rows;
 use crate::diagnose::views::samples::ViewData;
 use crate::diagnose::views::tiles::SIDE;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
@@ -77,30 +77,28 @@ pub fn together(view: &ViewData, terms: &[&Basis]) -> Option<Evidence> {
         (place.v / side) as usize * ACROSS + (place.u / side) as usize
     };
     let mut sum = Evidence::zeros(count);
-    rows.add_by_blocks(&mut sum, block, |i, row| append_all(terms, &view.places[i], 0, row));
+    rows.add_by_blocks(&mut sum, block, |i, row| {
+        visit_all(terms, &view.places[i], |k, g| row.push((k, g)));
+    });
     sum.a.fill_upper_triangle_with_lower_triangle();
     Some(sum)
 }
 
 /// Fills the columns of several terms, one after the other.
 pub fn fill_all(terms: &[impl Borrow<Basis>], place: &PixelContext, row: &mut [f64]) {
-    let mut rest = row;
-    for basis in terms.iter().map(Borrow::<Basis>::borrow) {
-        let (mine, others) = rest.split_at_mut(basis.count());
-        basis.fill(place, mine);
-        rest = others;
-    }
+    row.fill(0.0);
+    visit_all(terms, place, |k, g| row[k] += g);
 }
 
-/// Appends the columns of several terms that may be nonzero, the first of them numbered `first`.
-pub fn append_all(
+/// Passes index and value of the columns of several terms that may be nonzero to `see`.
+pub fn visit_all(
     terms: &[impl Borrow<Basis>],
     place: &PixelContext,
-    mut first: usize,
-    row: &mut Entries,
+    mut see: impl FnMut(usize, f64),
 ) {
+    let mut first = 0;
     for basis in terms.iter().map(Borrow::<Basis>::borrow) {
-        basis.visit(place, |k, g| row.push((first + k, g)));
+        basis.visit(place, |k, g| see(first + k, g));
         first += basis.count();
     }
 }
@@ -245,6 +243,6 @@ impl Prepared<'_> {
     /// Evidence on the terms fitted alongside and the basis.
     pub fn evidence(&self, basis: &Basis) -> Evidence {
         let (places, rows, _) = self.samples(basis);
-        rows.reduce(basis.count(), |i, g| basis.fill(&places[i], g))
+        rows.evidence(basis, places)
     }
 }

@@ -5,6 +5,8 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
+use super::touched::{Entries, TouchedColumns};
+use crate::terms::{Basis, PixelContext};
 
 /// One view's data with the columns fitted alongside every candidate: its nuisances and the terms
 /// already chosen.
@@ -130,6 +132,11 @@ impl<'a> Rows<'a> {
         sum
     }
 
+    /// Evidence on the chosen terms and a basis; a sample's place is the one of its index.
+    pub fn evidence(&self, basis: &Basis, places: &[PixelContext]) -> Evidence {
+        self.reduce(basis.count(), |i, row| basis.fill(&places[i], row))
+    }
+
     /// Adds what [`Rows::reduce`] gives to `sum`, for many columns of which neighbouring samples touch the
     /// same few: `block` gives a sample's neighbourhood, `columns` appends the index and value of its columns
     /// that may be nonzero. Lower triangle only; the upper one is to be filled after the last view.
@@ -244,58 +251,6 @@ fn squares(samples: &[f64], weight: &[f64], n: usize) -> DMatrix<f64> {
         sum.gemm(1.0, &rooted, &rooted.transpose(), 1.0);
     }
     sum
-}
-
-/// Index and value of a sample's columns that may be nonzero.
-pub type Entries = Vec<(usize, f64)>;
-
-/// The columns that a block of samples touches.
-struct TouchedColumns {
-    /// Their indices, ascending.
-    touched: Vec<usize>,
-    /// Row-major, one row per sample.
-    rows: Vec<f64>,
-    /// Place of every column among those touched.
-    place: Vec<usize>,
-    entries: Entries,
-}
-
-impl TouchedColumns {
-    fn of(columns: usize) -> Self {
-        let (touched, rows, entries) = (Vec::new(), Vec::new(), Vec::new());
-        TouchedColumns { touched, rows, place: vec![usize::MAX; columns], entries }
-    }
-
-    fn fill(
-        &mut self,
-        samples: impl Iterator<Item = usize>,
-        columns: impl Fn(usize, &mut Entries),
-    ) {
-        self.touched.drain(..).for_each(|j| self.place[j] = usize::MAX);
-        self.entries.clear();
-        let mut ends = Vec::new();
-        for i in samples {
-            columns(i, &mut self.entries);
-            ends.push(self.entries.len());
-        }
-        for &(j, g) in &self.entries {
-            if g != 0.0 && self.place[j] == usize::MAX {
-                self.place[j] = 0;
-                self.touched.push(j);
-            }
-        }
-        self.touched.sort_unstable();
-        self.touched.iter().enumerate().for_each(|(k, &j)| self.place[j] = k);
-        let width = self.touched.len();
-        self.rows.clear();
-        self.rows.resize(ends.len() * width, 0.0);
-        let mut first = 0;
-        for (row, end) in self.rows.chunks_exact_mut(width.max(1)).zip(ends) {
-            let mine = self.entries[first..end].iter().filter(|(_, g)| *g != 0.0);
-            mine.for_each(|&(j, g)| row[self.place[j]] += g);
-            first = end;
-        }
-    }
 }
 
 #[cfg(test)]

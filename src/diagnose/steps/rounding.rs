@@ -89,6 +89,15 @@ impl Rounding {
     }
 }
 
+/// Largest share of the variance that is taken for rounding. Where the noise is small against a step, a pixel's
+/// error of rounding hardly changes from frame to frame.
+const MAX_SHARE: f64 = 0.5;
+
+/// Share of the variance of words of this step (px^2) that is the error of rounding.
+pub fn share_of_rounding(step_px: f64, variance: f64) -> f64 {
+    (step_px.powi(2) / 12.0 / variance.max(1e-12)).min(MAX_SHARE)
+}
+
 /// Correlation of a view's frames because they are rounded to the same steps.
 pub fn rounded_alike(field: &Field) -> f64 {
     // Sigma is smooth.

@@ -155,7 +155,7 @@ fn share_left(fields: &[Field], bench: &Workbench<'_>) -> Option<f64> {
             places.push(place);
         }
         let rows = view.rows(&view.response)?;
-        Some(rows.reduce(1, |i, row| RAY_FOR_DEPTH.fill(&places[i], row)))
+        Some(rows.evidence(&RAY_FOR_DEPTH, &places))
     };
     let (a, b) = fields
         .iter()
@@ -186,7 +186,6 @@ pub(in crate::diagnose) fn read(
     known: &KnownTerms,
     progress: Progress<'_>,
 ) -> Read {
-    let times = recording.views.iter().filter_map(|v| v.depth.first()).map(|f| f.timestamp);
-    let start = times.fold(f64::INFINITY, f64::min);
+    let start = recording.start_s();
     recording.each_view(progress, |v| Field::read(v, bench, &model.sigma, known, start))
 }

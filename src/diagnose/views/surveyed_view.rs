@@ -274,7 +274,7 @@ mod tests {
         let bowl = Basis::powers(Coordinate::RadiusSquared, 2, Modulation::One);
         let nats = |data: &ViewData| {
             let rows = data.rows(&data.response).expect("nuisances that can be told apart");
-            let seen = rows.reduce(2, |i, g| bowl.fill(&data.places[i], g));
+            let seen = rows.evidence(&bowl, &data.places);
             0.5 * seen.b.dot(&(seen.a.try_inverse().expect("two columns") * &seen.b))
         };
         let planes = ViewData {

@@ -57,8 +57,7 @@ impl Tiles {
         let sensor = recording.sensor.clone();
         let known = KnownTerms::of(model, &sensor.camera);
         let bench = Workbench::new(&sensor, MeasureOptions::default());
-        let stamps = recording.views.iter().filter_map(|v| v.depth.first());
-        let start = stamps.map(|f| f.timestamp).fold(f64::INFINITY, f64::min);
+        let start = recording.start_s();
         let read = |view| Field::read(view, &bench, &model.sigma, &known, start).ok();
         let fields: Vec<Field> = recording.views.par_iter().filter_map(read).collect();
         let side = (sensor.camera.width / ACROSS).max(1);
