@@ -8,6 +8,7 @@ use crate::diagnose::checks::replication::Halves;
 use crate::diagnose::joint::anchor::Family;
 use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::null::Null;
+use crate::solve::Cholesky;
 use crate::terms::Axis;
 
 /// A law of distance error.
@@ -19,8 +20,9 @@ pub struct Law {
     /// RMS change of the depth, m and in sigmas.
     pub rms_m: f64,
     pub rms_sigma: f64,
-    /// Same, in errors of a reference.
-    pub rms_errors: f64,
+    /// RMS of the part of it that the nuisances beside it cannot imitate, m and in errors of a reference.
+    pub beyond_m: f64,
+    pub beyond_errors: f64,
     /// Parameters that determine its shape, each with its standard error.
     pub settled: Vec<(&'static str, [f64; 2])>,
     /// Nats.
@@ -73,6 +75,18 @@ impl<'a> References<'a> {
         self.checked.iter().enumerate().map(of).collect()
     }
 
+    /// What the nuisances, by their fit with their prior, leave of a law's `moves`; `views` is the evidence on both.
+    fn beyond_nuisances(&self, views: &[Evidence], moves: &[f64]) -> Option<Vec<f64>> {
+        let beside = self.others.first().map_or(0, Vec::len);
+        let all = Evidence::sum(beside + 1, PRIOR, views).a;
+        let own = all.view((0, 0), (beside, beside)).into_owned();
+        let like = Cholesky::of(own)?.solve(&all.view((0, beside), (beside, 1)).column(0).into());
+        let left = |(moves, others): (&f64, &Vec<f64>)| {
+            moves - others.iter().zip(like.iter()).map(|(o, l)| o * l).sum::<f64>()
+        };
+        Some(moves.iter().zip(&self.others).map(left).collect())
+    }
+
     /// Fits the law that moves the depth by `moves` times its coefficient, m.
     fn law(
         &self,
@@ -84,6 +98,7 @@ impl<'a> References<'a> {
         let beside = self.others.first().map_or(0, Vec::len);
         let views = self.evidence(Some(&moves));
         let moves: Vec<f64> = checked.iter().map(moves).collect();
+        let beyond = self.beyond_nuisances(&views, &moves)?;
         let mut gain = gain(&views, PRIOR)?;
         if beside > 0 {
             gain.total -= self::gain(&self.evidence(None), PRIOR).map_or(0.0, |alone| alone.total);
@@ -104,7 +119,8 @@ impl<'a> References<'a> {
             })),
             rms_m: rms(&|n| beta * moves[n]),
             rms_sigma: rms(&|n| beta * moves[n] / checked[n].sigma_m),
-            rms_errors: rms(&|n| beta * moves[n] / self.scatter.variances[n].sqrt()),
+            beyond_m: rms(&|n| beta * beyond[n]),
+            beyond_errors: rms(&|n| beta * beyond[n] / self.scatter.variances[n].sqrt()),
             settled: Vec::new(),
             gain: gain.total,
             estimate: [beta, gain.covariance[(beside, beside)].sqrt()],

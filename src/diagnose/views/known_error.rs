@@ -1,6 +1,6 @@
 //! The model's own uncertainty: differences of new views that it explains are no missing effects.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -12,6 +12,7 @@ use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::variance::error_of_sigma;
 use crate::model::{Domain, SigmaModel};
+use crate::solve::plane_through;
 use crate::terms::{PixelContext, Statistic, Term};
 
 /// Probability that a correct model differs by more than its own error.
@@ -135,15 +136,22 @@ impl Survey {
         })
     }
 
-    /// Subtracts from the views' means what the uncertainty of the model's biases explains.
+    /// Subtracts from the views' means what the uncertainty of the model's biases explains. Each view keeps its
+    /// plane: what the planes absorb these means do not show, and reference distances are compared with it.
     pub fn absorb_model_bias_error(&mut self, known: &KnownTerms) {
         let off = Errors::of(known, Statistic::Bias).settled(&self.coarse_mean_data());
         if off.is_empty() {
             return;
         }
         self.views.par_iter_mut().for_each(|view| {
-            for (place, t) in view.tiles_mut() {
-                let off = Term::sum(&off, place);
+            let mut off: Vec<f64> = view.places.iter().map(|p| Term::sum(&off, p)).collect();
+            let measured = view.patches().zip(&off).filter(|((_, t), _)| t.mean.is_finite());
+            let points = measured.map(|((p, t), off)| ([p.x, p.y], *off, t.pixels));
+            if let Some(plane) = plane_through(points) {
+                let on_plane = view.places.iter().map(|p| plane.dot(&Vector3::new(1.0, p.x, p.y)));
+                off.iter_mut().zip(on_plane).for_each(|(off, plane)| *off -= plane);
+            }
+            for ((_, t), off) in view.tiles_mut().zip(off) {
                 t.square += off * (off - 2.0 * t.mean);
                 t.mean -= off;
             }
