@@ -1,6 +1,6 @@
 //! A dark surface is noisier.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::scene::WHITE;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
@@ -14,7 +14,6 @@ pub(super) static CARD: Card = Card {
     summary: "a dark surface sends back less of the pattern, and the match is noisier: an infrared picture of a printed target shows it",
     parameters: &[Parameter {
         name: "exponent",
-        unit: "",
         range: [0.0, 4.0],
         typical: 0.5,
         summary: "sigma goes with the reflectance to minus this; nothing changes on white paper",
@@ -41,6 +40,14 @@ impl Effect for IntensityDependentNoise {
         let kinds = [(1, false), (1, true), (2, true)].into_iter();
         let seen = kinds.filter(|_| bounds.reach.is_unevenly_lit());
         seen.map(|(orders, level)| dark(orders, level)).collect()
+    }
+
+    /// Brighter surfaces are less noisy, from the median light to twice as much. Where they are noisier, the room
+    /// shines on them.
+    fn agrees_with(&self, _: Option<&Flat>, _: &Basis, coefficients: &[f64]) -> bool {
+        let bend = coefficients.get(BEND).copied().unwrap_or(0.0);
+        let slope = |light: f64| coefficients[0] + 2.0 * bend * light.ln();
+        slope(1.0) < 0.0 && slope(2.0) < 0.0
     }
 
     /// Exponent of the power law; where the shape has a bend, of the fit without it.
