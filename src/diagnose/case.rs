@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::against::Baseline;
 use super::diagnosis::Finding;
-use super::finding::pixels::{mean_of, pixel_terms, terms_of};
+use super::finding::pixels::{mean_of, pixel_terms, take_out, terms_of};
 use super::missing::DropoutOutcome;
 use super::noise::lines::LearntLines;
 use super::noise::still::{KeptPattern, beside_bias, still};
@@ -40,7 +40,6 @@ pub struct Case<'a> {
     pub baseline: Option<Baseline>,
     /// Share of a fixed pattern that remains after the means are subtracted.
     pub kept: KeptPattern,
-    /// Steps of the raw words.
     /// Step of the stored words.
     pub lattice: Option<Step>,
     /// Losses. The second run reuses those of the first, whose sigma tells how hard an end of the range is.
@@ -98,8 +97,18 @@ impl<'a> Case<'a> {
         let lattice = measure_steps(&mut fields, recording, &bench.rays);
         let kept = KeptPattern::of(&fields);
         let learnt = (learnt_from(model, &known, options, simulated.is_some()), &known);
-        let survey =
-            survey((&fields, &kept, lattice), &bench, baseline.as_ref(), options, learnt, model);
+        let surveyed = |fields: &[Field]| {
+            survey((fields, &kept, lattice), &bench, baseline.as_ref(), options, learnt, model)
+        };
+        let mut survey = surveyed(&fields);
+        // Two recordings are compared in the same units of sigma, whatever light fell on them.
+        let [bias, variance] = known.over_light();
+        if baseline.is_none() && !(bias.is_empty() && variance.is_empty()) {
+            take_out(&mut fields, [&bias, &variance], &survey, &bench);
+            // Two surveys at once are a quarter of all memory.
+            drop(survey);
+            survey = surveyed(&fields);
+        }
         Ok(Case {
             recording,
             model,

@@ -1,10 +1,10 @@
 //! Diagnosis against a model learnt from other views of the sensor: an unchanged sensor is no mismatch, and a
 //! changed one is.
 
-use kinoise::diagnose::{DiagnoseOptions, Verdict, diagnose};
+use kinoise::diagnose::{DiagnoseOptions, Finding, Verdict, diagnose};
 use kinoise::effects::Active;
-use kinoise::scene::Target;
-use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
+use kinoise::scene::{PATCH_SIDE_M, Print, Target, WHITE};
+use kinoise::simulate::{Grid, Physics, Scenery, Shoot, kinect_v1, plan_grid};
 use kinoise::{
     CalibrateOptions, NoiseModel, Recording, Seed, SigmaModel, io, measure_recording, model_of,
 };
@@ -13,15 +13,26 @@ use tempfile::TempDir;
 /// A bowl three times the noise of so small a sensor: with a deeper one the wall is not flat.
 const SENSOR: [&str; 2] = ["radial-disparity-bias:k_px=0.05", "vignetting:growth=0.4"];
 
-/// Fifteen views of a wall by a small Kinect with these effects.
+/// Fifteen views of a white wall by a small Kinect with these effects.
 fn views(effects: &[&str], seed: u64) -> (TempDir, Recording) {
+    views_of(Print::Plain(WHITE), effects, seed)
+}
+
+/// Same of a wall with this print.
+fn views_of(print: Print, effects: &[&str], seed: u64) -> (TempDir, Recording) {
     let folder = tempfile::tempdir().expect("a folder");
     let distances_m = vec![1.0, 1.4, 2.0, 2.8, 4.0];
     let poses = Grid { distances_m, tilts_rad: vec![0.0, 0.3, 0.6] }.views();
     let sigma = SigmaModel::paper();
-    let mut shoot = Shoot::plain(kinect_v1(4), Target::Wall, &poses, 4, sigma.clone(), Seed(seed));
+    let scenery = Scenery { print, ..Scenery::bare(Target::Wall) };
     let effects = effects.iter().map(|e| Active::parse(e).expect("an effect")).collect();
-    shoot.physics = Physics::Formula { sigma, effects };
+    let shoot = Shoot {
+        sensor: kinect_v1(4),
+        views: plan_grid(&poses, &scenery, 4, true, Seed(seed)),
+        physics: Physics::Formula { sigma, effects },
+        infrared: matches!(print, Print::Patches(_)),
+        seed: Seed(seed),
+    };
     shoot.write(folder.path(), &|_, _| ()).expect("written");
     let recording = io::open(folder.path(), &io::Assumed::default()).expect("opened");
     (folder, recording)
@@ -74,6 +85,28 @@ fn a_sensor_is_itself_and_a_changed_one_is_not() {
         let names: Vec<_> = found.iter().filter_map(|f| f.effect).collect();
         assert!(names.contains(&change), "{change}: {names:?}");
     }
+}
+
+/// What follows the light of a printed target is known again, though the light is known only once all views are
+/// read.
+#[test]
+fn noise_that_follows_the_print_is_known_again() {
+    let paper = NoiseModel::paper();
+    let dark = ["intensity-dependent-noise:exponent=0.5"];
+    let judge = |model: &NoiseModel, effects: &[&str], seed| {
+        let (_folder, recording) = views_of(Print::Patches(PATCH_SIDE_M), effects, seed);
+        let options = DiagnoseOptions::default();
+        diagnose(&recording, model, &options, &|_, _| ()).expect("diagnosed")
+    };
+    let named = |found: &[Finding]| found.iter().filter_map(|f| f.effect).collect::<Vec<_>>();
+    let first = judge(&paper, &dark, 1);
+    assert!(named(&first.diagnosis.findings).contains(&"intensity-dependent-noise"));
+    for seed in 2..5 {
+        let again = judge(&first.model, &dark, seed).diagnosis;
+        assert_eq!(again.verdict, Verdict::Match, "seed {seed}: {:?}", named(&again.findings));
+    }
+    let changed = judge(&first.model, &[], 5).diagnosis;
+    assert_eq!(changed.verdict, Verdict::Mismatch);
 }
 
 /// Against a model whose sigma is too large, only sigma is off: views are weighted relative to it, and after

@@ -5,9 +5,8 @@
 use crate::diagnose::battery::Battery;
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::{After, Finding, Remaining};
-use crate::diagnose::finding::pixels::pixel_terms;
+use crate::diagnose::finding::pixels::take_out;
 use crate::diagnose::verdict::verdict;
-use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::model::{Effect, NoiseModel};
 
@@ -21,16 +20,8 @@ impl<'a> Case<'a> {
         self.progress.stage("testing the extended model");
         let added = self.added(extended);
         let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
-        let bias = pixel_terms(&self.fields, &added.bias, &self.survey, &self.bench);
-        let spread = pixel_terms(&self.fields, &added.variance, &self.survey, &self.bench);
         let mut fields = std::mem::take(&mut self.fields);
-        for (n, field) in fields.iter_mut().enumerate() {
-            bias.get(n).into_iter().for_each(|b| take_out(field, b));
-            for (sigma, log) in field.sigma.iter_mut().zip(spread.get(n).into_iter().flatten()) {
-                *sigma *= (0.5 * log).exp();
-            }
-        }
-        drop((bias, spread));
+        take_out(&mut fields, [&added.bias, &added.variance], &self.survey, &self.bench);
         let mut case = self.again(fields, extended);
         let battery = case.battery();
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);
@@ -48,26 +39,13 @@ impl<'a> Case<'a> {
     }
 }
 
-/// Subtracts `bias` (px by pixel) from the residuals. Means of whole frames are only compared with one
-/// another, and keep what all frames share.
-fn take_out(field: &mut Field, bias: &[f32]) {
-    let both = field.mean.iter_mut().zip(&mut field.square);
-    for ((mean, square), b) in both.zip(bias) {
-        *square += b * (b - 2.0 * *mean);
-        *mean -= b;
-    }
-    for frame in &mut field.first {
-        frame.iter_mut().zip(bias).for_each(|(e, b)| *e -= b);
-    }
-}
-
 fn after(battery: &Battery, explained: f64) -> After {
     let remaining = |f: &Finding| {
         let name = f.effect.unwrap_or("a curve without a name");
         Remaining {
             statistic: f.statistic,
             axis: f.axis,
-            share: f.share / (explained + f.share),
+            share: f.share / (explained + f.share).max(f64::MIN_POSITIVE),
             p_adjusted: f.p_adjusted,
             words: format!("{name} would still bring {:.0} nats", f.share),
         }

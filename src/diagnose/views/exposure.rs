@@ -77,15 +77,16 @@ impl Field {
         let n = self.pixels.len();
         let mut expected: Vec<f32> =
             (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
-        if known.bias.is_empty() && known.variance.is_empty() {
+        let [bias, variance] = known.by_place();
+        if bias.is_empty() && variance.is_empty() {
             return expected;
         }
         let mut sigma = self.sigma.clone();
         let places = Places::of(self, &bench.sensor.camera, &bench.rays);
         for k in 0..n {
             let place = places.pixel(k);
-            expected[k] += Term::sum(&known.bias, &place) as f32;
-            sigma[k] *= (0.5 * Term::sum(&known.variance, &place)).exp() as f32;
+            expected[k] += Term::sum(&bias, &place) as f32;
+            sigma[k] *= (0.5 * Term::sum(&variance, &place)).exp() as f32;
         }
         self.sigma = sigma;
         expected

@@ -41,6 +41,21 @@ impl KnownTerms {
         known
     }
 
+    /// Those of the bias and of the variance that follow the light, which is known once all views are read.
+    pub fn over_light(&self) -> [Vec<Term>; 2] {
+        self.by_light(true)
+    }
+
+    /// The others.
+    pub fn by_place(&self) -> [Vec<Term>; 2] {
+        self.by_light(false)
+    }
+
+    fn by_light(&self, light: bool) -> [Vec<Term>; 2] {
+        let mine = |t: &&Term| t.needs().light == light;
+        [&self.bias, &self.variance].map(|terms| terms.iter().filter(mine).cloned().collect())
+    }
+
     /// Marks a parameter of an effect as known, without subtracting anything.
     pub fn learn(&mut self, id: &str, name: &str, value: f64) {
         let at = self.effects.iter().position(|known| known.id == id);

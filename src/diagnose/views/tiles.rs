@@ -147,7 +147,7 @@ pub fn tiles(field: &Field, camera: &Camera, rays: &Rays) -> (Vec<PixelContext>,
             let n = f64::from(field.count[k]);
             s.temporal += n * (square - mean * mean);
             s.repeats += n - 1.0;
-            s.darkness += f64::from(field.light.get(k).copied().unwrap_or(1.0)).recip();
+            s.darkness += field.light.get(k).map_or(f64::NAN, |light| f64::from(*light).recip());
         }
     }
     let held = || sums.iter().filter(|s| s.pixels > 0.0);
