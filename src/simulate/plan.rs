@@ -183,7 +183,13 @@ pub fn plan_like(
         let mut notes = view.notes.clone();
         if notes.reference_distance_m.is_some() {
             let z_m = plane.depth(0.0, 0.0);
-            notes.reference_distance_m = reference(z_m, reference_error_m, seed, &view.name);
+            let drawn = reference(z_m, reference_error_m, seed, &view.name);
+            // The layout refuses an uncertainty that is not below the distance.
+            let above = |d: &f64| notes.reference_uncertainty_m.is_none_or(|u| u < *d);
+            notes.reference_distance_m = drawn.filter(above);
+            if notes.reference_distance_m.is_none() {
+                notes.reference_uncertainty_m = None;
+            }
         }
         let stamps = view.depth.iter().map(|f| f.timestamp).collect();
         plan_on(&view.name, &plane, &pixels, &bench.rays, stamps, notes)

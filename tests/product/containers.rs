@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use kinoise::correct::{CorrectOptions, correct_recording};
@@ -14,6 +15,7 @@ use kinoise::{
     model_of, sequence,
 };
 use serde_json::{Value, json};
+use zip::write::SimpleFileOptions;
 
 use crate::common::{kinoise, write_depth};
 
@@ -254,6 +256,34 @@ fn stacks_are_read_as_folders_of_images_are() {
     assert!(two.contains("far") && two.contains("near") && two.contains("--topic"), "{two}");
     let camera = refused("words.npy", &Assumed::default());
     assert!(camera.contains("--intrinsics"), "{camera}");
+}
+
+/// An array that cannot be read may be the depth, unless another is named.
+#[test]
+fn a_named_array_is_read_whatever_stands_beside_it() {
+    let folder = folder();
+    let path = folder.path().join("three.npz");
+    std::fs::copy(container("two.npz"), &path).expect("copied");
+    let file = std::fs::File::options().read(true).write(true).open(&path).expect("opened");
+    let mut archive = zip::ZipWriter::new_append(file).expect("an archive");
+    archive.start_file("colour.npy", SimpleFileOptions::default()).expect("begun");
+    let header = "{'descr': '<u2', 'fortran_order': True, 'shape': (2, 3, 4), }";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend([0; 48]);
+    archive.write_all(&bytes).expect("written");
+    archive.finish().expect("closed");
+    let of = |topic: Option<&str>| Assumed {
+        intrinsics: Some([29.0, 29.25, 15.5, 11.75]),
+        code: Some(MILLIMETRES),
+        topic: topic.map(String::from),
+        ..Assumed::default()
+    };
+    let far = open_uncut(&path, &of(Some("far"))).expect("far");
+    assert!(frames(&far)[0].1 == film()[film().len() - 1]);
+    let refused = open_uncut(&path, &of(None)).expect_err("colour").to_string();
+    assert!(refused.contains("colour") && refused.contains("ascontiguousarray"), "{refused}");
 }
 
 #[test]

@@ -48,6 +48,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::assumed::Assumed;
+use super::layout::DESCRIPTIONS;
 use super::output::entries;
 use super::stills::Footage;
 use crate::error::{Error, Result};
@@ -91,7 +92,8 @@ impl Kind {
 const METADATA: &str = "metadata.yaml";
 
 pub(super) fn is_one(path: &Path) -> bool {
-    Kind::of(path).is_some() || path.join(METADATA).is_file()
+    let described = || DESCRIPTIONS.iter().any(|name| path.join(name).exists());
+    Kind::of(path).is_some() || path.join(METADATA).is_file() && !described()
 }
 
 /// The only bag in a rosbag2 folder.

@@ -78,7 +78,8 @@ impl Header {
         let shape = sizes.ok_or("the shape is not understood")?;
         let number = descr.and_then(Number::of).ok_or_else(|| {
             let kind = descr.unwrap_or("records");
-            Fault::Numbers(format!("its numbers are {kind}, not integers or floats"), shape.len())
+            let what = format!("its numbers are {kind}, not integers, nor floats of 32 or 64 bits");
+            Fault::Numbers(what, shape.len())
         })?;
         if !order.starts_with("False") {
             let what = "it is in Fortran's order; save np.ascontiguousarray(a)".into();
@@ -99,7 +100,7 @@ impl Number {
     fn of(descr: &str) -> Option<Self> {
         let [order, kind, size] = *descr.as_bytes() else { return None };
         let known =
-            matches!(&[kind, size], b"u1" | b"u2" | b"u4" | b"i2" | b"i4" | b"i8" | b"f4" | b"f8");
+            matches!(&[kind, size], [b'u' | b'i', b'1' | b'2' | b'4' | b'8'] | b"f4" | b"f8");
         let number =
             Number { kind, size: usize::from(size.wrapping_sub(b'0')), big_endian: order == b'>' };
         (known && b"<|=>".contains(&order)).then_some(number)
@@ -123,6 +124,8 @@ impl Number {
             (b'i', 2) => values!(i16, f64::from),
             (b'i', 4) => values!(i32, f64::from),
             (b'u', 4) => values!(u32, f64::from),
+            (b'u', 8) => values!(u64, |v| v as f64),
+            (b'i', 1) => values!(i8, f64::from),
             (b'i', 8) => values!(i64, |v| v as f64),
             (b'f', 4) => values!(f32, f64::from),
             _ => values!(f64, f64::from),

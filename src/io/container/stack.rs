@@ -107,8 +107,10 @@ pub fn open_npy(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
 pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let is_used =
         |name: &str| BESIDE.contains(&name) || assumed.topic.as_deref().is_some_and(|t| t == name);
+    let members = members(path)?;
     let (mut arrays, mut unread) = (Vec::new(), None);
-    for member in &members(path)? {
+    // Where the depth is named, nothing else need be readable.
+    for member in members.iter().filter(|m| assumed.topic.is_none() || is_used(&m.name)) {
         match Array::open(path, Some(member))? {
             Ok(array) => arrays.push(array),
             Err((e, _)) if is_used(&member.name) => return Err(e),
@@ -117,15 +119,12 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     }
     let stacks: Vec<usize> =
         (0..arrays.len()).filter(|&i| arrays[i].header.shape.len() > 2).collect();
-    let names = |of: &[usize]| {
-        let names: Vec<&str> = of.iter().filter_map(|&i| arrays[i].name.as_deref()).collect();
-        names.join(", ")
-    };
-    let all: Vec<usize> = (0..arrays.len()).collect();
+    let named = |names: Vec<&str>| names.join(", ");
     let chosen = match (&assumed.topic, &stacks[..]) {
         (Some(topic), _) => {
             arrays.iter().position(|a| a.name == Some(topic.clone())).ok_or_else(|| {
-                let what = format!("there is no array {topic}; these are: {}", names(&all));
+                let all = named(members.iter().map(|m| m.name.as_str()).collect());
+                let what = format!("there is no array {topic}; these are: {all}");
                 Error::recording(path, what, "give one of them to --topic")
             })?
         }
@@ -134,11 +133,13 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
             if let Some(unread) = unread {
                 return Err(unread);
             }
-            let what = format!("no array is a stack of images; these are: {}", names(&all));
+            let all = named(members.iter().map(|m| m.name.as_str()).collect());
+            let what = format!("no array is a stack of images; these are: {all}");
             return Err(Error::recording(path, what, REMEDY));
         }
         (None, _) => {
-            let what = format!("several arrays are stacks of images: {}", names(&stacks));
+            let names = stacks.iter().filter_map(|&i| arrays[i].name.as_deref()).collect();
+            let what = format!("several arrays are stacks of images: {}", named(names));
             return Err(Error::recording(path, what, "choose one with --topic"));
         }
     };
