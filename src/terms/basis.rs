@@ -1,5 +1,8 @@
 //! Shapes of terms: a few kinds, each over coordinates and times a modulation.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::place::PixelContext;
@@ -9,7 +12,8 @@ use super::series::{
 
 /// Everything of a term but its linear coefficients. Terms of the bias are in px of disparity, those of the
 /// variance in its natural logarithm.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Basis {
     /// Constant.
     Level,
@@ -21,12 +25,14 @@ pub enum Basis {
     Waves { over: Coordinate, period: f64, harmonics: usize, times: Modulation },
     /// Radial distortion, in orders of r^2, of the lens through which a matcher sees both the scene and its
     /// reference, which was recorded where the disparity is `reference_px`.
+    #[serde(rename = "matched-lens")]
     Lens { fx: f64, fy: f64, reference_px: f64, orders: usize },
     /// Exponential decay from where the coordinate is zero.
     Decay { over: Coordinate, width: f64 },
     /// Logarithm of one plus the coordinate, which adds to a variance.
     Log1p { over: Coordinate },
     /// Tables over depth and tilt, one per coefficient.
+    #[serde(rename = "recalibrate")]
     Table { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
     /// Piecewise linear over an axis, between evenly spaced nodes. A lift over the target's own coordinates
     /// has its straight part removed.
@@ -38,6 +44,7 @@ pub enum Basis {
     /// A smooth map over the picture: products of cubic B-splines.
     Spline { width: f64, height: f64, across: usize, down: usize, times: Modulation },
     /// 1, x and y of the ray: the part of a shape that planes absorb.
+    #[serde(rename = "absorbed")]
     Affine { times: Modulation },
     /// A bilinear map over two axes.
     Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },

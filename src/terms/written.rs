@@ -12,8 +12,15 @@ use super::{Statistic, Term};
 #[derive(Serialize, Deserialize, JsonSchema)]
 pub(super) struct Written {
     statistic: Statistic,
-    basis: Kind,
+    basis: Shape,
     coefficients: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a shape of a known kind, with all its numbers")]
+enum Shape {
+    Older(Kind),
+    Own(Basis),
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
@@ -32,43 +39,32 @@ enum Kind {
     TiltAxis { tilt_power: i32 },
     Intensity { orders: usize },
     Ambient { ratio: f64 },
-    Level,
-    Recalibrate { z_m: [f64; 2], theta_rad: [f64; 2], columns: Vec<Vec<f64>> },
-    Curve { over: Coordinate, low: f64, high: f64, nodes: usize, times: Modulation },
-    Ring { over: Coordinate, period: f64, nodes: usize, times: Modulation },
-    Map { width: f64, height: f64, across: usize, down: usize, times: Modulation },
-    Spline { width: f64, height: f64, across: usize, down: usize, times: Modulation },
     Affine { disparity_power: f64 },
-    Pair { over: [Coordinate; 2], low: [f64; 2], high: [f64; 2], nodes: [usize; 2] },
-    MatchedLens { fx: f64, fy: f64, reference_px: f64, orders: usize },
-    // Shapes that none of the kinds above holds.
-    Powers { over: Coordinate, orders: usize, level: bool, times: Modulation },
-    Polynomial { over: [Coordinate; 2], degree: usize, times: Modulation },
-    Waves { over: Coordinate, period: f64, harmonics: usize, times: Modulation },
-    Decay { over: Coordinate, width: f64 },
-    Log1p { over: Coordinate },
-    Absorbed { times: Modulation },
 }
 
 impl From<Term> for Written {
     fn from(Term { statistic, basis, coefficients }: Term) -> Self {
-        Written { statistic, basis: Kind::of(basis, statistic), coefficients }
+        let basis = Kind::of(&basis, statistic).map_or(Shape::Own(basis), Shape::Older);
+        Written { statistic, basis, coefficients }
     }
 }
 
 impl From<Written> for Term {
     fn from(Written { statistic, basis, coefficients }: Written) -> Self {
-        Term { statistic, basis: basis.into(), coefficients }
+        let basis = match basis {
+            Shape::Older(kind) => kind.into(),
+            Shape::Own(basis) => basis,
+        };
+        Term { statistic, basis, coefficients }
     }
 }
 
 impl Kind {
     /// A bowl of the variance that does not change with the disparity is written as vignetting.
-    fn of(basis: Basis, statistic: Statistic) -> Self {
+    fn of(basis: &Basis, statistic: Statistic) -> Option<Self> {
         use Coordinate as C;
         use Modulation as M;
-        match basis {
-            Basis::Level => Kind::Level,
+        Some(match *basis {
             Basis::Powers { over, orders, level, times } => match (over, times, level) {
                 (C::RadiusSquared, M::One, false) if statistic == Statistic::Variance => {
                     Kind::Vignetting { orders }
@@ -85,44 +81,25 @@ impl Kind {
                 }
                 (C::LogLight, M::One, false) if orders == 1 => Kind::Intensity { orders: 1 },
                 (C::LogLight, M::One, true) => Kind::Intensity { orders: orders + 1 },
-                _ => Kind::Powers { over, orders, level, times },
+                _ => return None,
             },
             Basis::Polynomial { over: [C::Right, C::Down], degree, times: M::Lift } => {
                 Kind::Bow { degree }
             }
-            Basis::Polynomial { over, degree, times } => Kind::Polynomial { over, degree, times },
-            Basis::Waves { over, period, harmonics, times } => match (over, times) {
-                (C::Disparity, M::One) => Kind::Locking { period_px: period, harmonics },
-                (C::Column, M::One) => Kind::Banding { period_px: period, harmonics },
-                _ => Kind::Waves { over, period, harmonics, times },
-            },
-            Basis::Lens { fx, fy, reference_px, orders } => {
-                Kind::MatchedLens { fx, fy, reference_px, orders }
+            Basis::Waves { over: C::Disparity, period, harmonics, times: M::One } => {
+                Kind::Locking { period_px: period, harmonics }
+            }
+            Basis::Waves { over: C::Column, period, harmonics, times: M::One } => {
+                Kind::Banding { period_px: period, harmonics }
             }
             Basis::Decay { over: C::Edge, width } => Kind::EdgeMixing { width_px: width },
-            Basis::Decay { over, width } => Kind::Decay { over, width },
             Basis::Log1p { over: C::Blur(lateral_px) } => Kind::SlopeNoise { lateral_px },
             Basis::Log1p { over: C::Ambient(ratio) } => Kind::Ambient { ratio },
-            Basis::Log1p { over } => Kind::Log1p { over },
-            Basis::Table { z_m, theta_rad, columns } => {
-                Kind::Recalibrate { z_m, theta_rad, columns }
+            Basis::Affine { times } => {
+                Kind::Affine { disparity_power: times.power_of_disparity()? }
             }
-            Basis::Curve { over, low, high, nodes, times } => {
-                Kind::Curve { over, low, high, nodes, times }
-            }
-            Basis::Ring { over, period, nodes, times } => Kind::Ring { over, period, nodes, times },
-            Basis::Map { width, height, across, down, times } => {
-                Kind::Map { width, height, across, down, times }
-            }
-            Basis::Spline { width, height, across, down, times } => {
-                Kind::Spline { width, height, across, down, times }
-            }
-            Basis::Affine { times } => match times.power_of_disparity() {
-                Some(disparity_power) => Kind::Affine { disparity_power },
-                None => Kind::Absorbed { times },
-            },
-            Basis::Pair { over, low, high, nodes } => Kind::Pair { over, low, high, nodes },
-        }
+            _ => return None,
+        })
     }
 }
 
@@ -159,35 +136,7 @@ impl From<Kind> for Basis {
                 Basis::Powers { over: C::LogLight, orders, level, times }
             }
             Kind::Ambient { ratio } => Basis::Log1p { over: C::Ambient(ratio) },
-            Kind::Level => Basis::Level,
-            Kind::Recalibrate { z_m, theta_rad, columns } => {
-                Basis::Table { z_m, theta_rad, columns }
-            }
-            Kind::Curve { over, low, high, nodes, times } => {
-                Basis::Curve { over, low, high, nodes, times }
-            }
-            Kind::Ring { over, period, nodes, times } => Basis::Ring { over, period, nodes, times },
-            Kind::Map { width, height, across, down, times } => {
-                Basis::Map { width, height, across, down, times }
-            }
-            Kind::Spline { width, height, across, down, times } => {
-                Basis::Spline { width, height, across, down, times }
-            }
             Kind::Affine { disparity_power } => Basis::Affine { times: M::still(disparity_power) },
-            Kind::Pair { over, low, high, nodes } => Basis::Pair { over, low, high, nodes },
-            Kind::MatchedLens { fx, fy, reference_px, orders } => {
-                Basis::Lens { fx, fy, reference_px, orders }
-            }
-            Kind::Powers { over, orders, level, times } => {
-                Basis::Powers { over, orders, level, times }
-            }
-            Kind::Polynomial { over, degree, times } => Basis::Polynomial { over, degree, times },
-            Kind::Waves { over, period, harmonics, times } => {
-                Basis::Waves { over, period, harmonics, times }
-            }
-            Kind::Decay { over, width } => Basis::Decay { over, width },
-            Kind::Log1p { over } => Basis::Log1p { over },
-            Kind::Absorbed { times } => Basis::Affine { times },
         }
     }
 }
