@@ -31,7 +31,7 @@ pub(in crate::diagnose) fn common(
     if !told {
         return [0.0; 3];
     }
-    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged_as_stored()[lag]));
+    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged_beside_rounding()[lag]));
     let is_measured = |lag: usize| structure.iter().any(|s| s.lagged[lag].is_some());
     let second = if is_measured(1) { at(1) } else { at(0) };
     [at(0), second, if is_measured(2) { at(2) } else { at(1) }]
@@ -84,8 +84,7 @@ pub(in crate::diagnose) fn measure_tails(
         let factor = |k: usize| factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
         let sigma_px: Vec<f32> = (0..told.len()).map(|k| field.sigma[k] * factor(k)).collect();
         // Single frames, unless their constant part could be taken for a tail.
-        let next = s.lagged_as_stored()[0];
-        let apart = next.is_some_and(|c| c < HARDLY_STILL);
+        let apart = s.alike.is_some_and(|c| c < HARDLY_STILL);
         let whitened = |frame: &Vec<f32>| {
             let white = |k: usize| {
                 let error = frame[k] - bias.get(n).map_or(0.0, |b| b[k]);
@@ -95,13 +94,13 @@ pub(in crate::diagnose) fn measure_tails(
         };
         let mut looks: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
         if !apart && !looks.is_empty() {
-            looks = vec![moving(&looks, next)];
+            looks = vec![moving(&looks, s.alike)];
         }
         (s.tails, s.moments) = (TailCounts::default(), Moments::default());
         let mut far = vec![false; looks.first().map_or(0, Vec::len)];
         for look in &looks {
             s.tails.add(&tail(look, field.width, &mut far));
-            s.moments.add(&Moments::of(look, field.width));
+            s.moments.add(look, field.width);
         }
         s.far_places = places(far, field.width);
         let disparity = |k| field.disparity(k, &bench.rays) as f32;
@@ -169,6 +168,35 @@ impl Still {
     /// Value at pixel `i` of the picture on a surface of this disparity, px.
     fn at(&self, i: u32, disparity: f64) -> f64 {
         disparity_power(self.power, disparity) * self.values[i as usize]
+    }
+}
+
+/// Subtracts the `bias` from the residuals, and multiplies sigma by what the `variance` terms make of it.
+pub(in crate::diagnose) fn take_out(
+    fields: &mut [Field],
+    [bias, variance]: [&[Term]; 2],
+    survey: &Survey,
+    bench: &Workbench<'_>,
+) {
+    let [bias, spread] = [bias, variance].map(|terms| pixel_terms(fields, terms, survey, bench));
+    for (n, field) in fields.iter_mut().enumerate() {
+        bias.get(n).into_iter().for_each(|b| shift(field, b));
+        for (sigma, log) in field.sigma.iter_mut().zip(spread.get(n).into_iter().flatten()) {
+            *sigma *= (0.5 * log).exp();
+        }
+    }
+}
+
+/// Subtracts `bias` (px by pixel) from the residuals. Means of whole frames are only compared with one
+/// another, and keep what all frames share.
+fn shift(field: &mut Field, bias: &[f32]) {
+    let both = field.mean.iter_mut().zip(&mut field.square);
+    for ((mean, square), b) in both.zip(bias) {
+        *square += b * (b - 2.0 * *mean);
+        *mean -= b;
+    }
+    for frame in &mut field.first {
+        frame.iter_mut().zip(bias).for_each(|(e, b)| *e -= b);
     }
 }
 

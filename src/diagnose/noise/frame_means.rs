@@ -188,7 +188,7 @@ fn jitter(
     let error = UNEVEN.hypot(1.0 / (2.0 * noise.freedom).sqrt());
     Some(TextureFinding {
         parameters: one("sigma_px", sigma, sigma * error),
-        size_sigma: (noise.extra_px2 / variance_px2.max(1e-12)).sqrt(),
+        size_sigma: ((noise.extra_px2 - known_px2).max(0.0) / variance_px2.max(1e-12)).sqrt(),
         p,
         nats,
         ..TextureFinding::named(vec![JITTERS], Statistic::Correlation, Axis::Frame)

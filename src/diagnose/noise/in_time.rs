@@ -91,7 +91,7 @@ fn beside(
         if p < level {
             let names = vec!["frozen-noise", "temporal-correlation"];
             let fraction = ("fraction", first.value, first_error);
-            let evidence = (p, nats(&first, 0.0));
+            let evidence = (p, nats(&first, frozen_known + rho_known));
             found.push(of_frames(views.views, names, [0.0, 1.0], fraction, more, evidence));
         }
         return found;

@@ -40,8 +40,8 @@ impl Structure {
         self.lagged.map(|c| Some((c? - share) / left))
     }
 
-    /// Correlation of a pixel with itself 1, 2 and 3 frames later, of the stored words, rounding included.
-    pub fn lagged_as_stored(&self) -> [Option<f64>; 3] {
+    /// Same with the error of rounding in the variance, though not in the covariance.
+    pub fn lagged_beside_rounding(&self) -> [Option<f64>; 3] {
         self.lagged.map(|c| Some(c? * (1.0 - self.rounding)))
     }
 

@@ -12,7 +12,7 @@ use super::lagged::{later, of_any_two};
 use super::structure::Structure;
 use super::view_mean::{ViewMean, variance_px2};
 use crate::diagnose::views::known::KnownTerms;
-use crate::stats::mean;
+use crate::stats::{bisect, mean};
 
 /// A statistic of a view, and its standard error by the noise of the pixels.
 type Implied = fn(&Structure) -> Option<[f64; 2]>;
@@ -173,12 +173,7 @@ fn inverse_trigamma(value: f64) -> f64 {
         return f64::INFINITY;
     }
     // Trigamma lies between 1/x and 1/x + 1/x^2.
-    let (mut low, mut high) = (1.0 / value, 1.0 / value + 1.0 / value.sqrt());
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        *(if trigamma(middle) > value { &mut low } else { &mut high }) = middle;
-    }
-    low
+    bisect([1.0 / value, 1.0 / value + 1.0 / value.sqrt()], |x| trigamma(x) > value)[0]
 }
 
 #[cfg(test)]

@@ -47,10 +47,9 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Sums over the residuals of an image: row-major, `width` px wide, in any unit, NaN where there is none.
-    pub fn of(image: &[f32], width: usize) -> Self {
+    /// Adds the residuals of an image: row-major, `width` px wide, in any unit, NaN where there is none.
+    pub fn add(&mut self, image: &[f32], width: usize) {
         let mut unit = vec![f64::NAN; image.len()];
-        let mut sums = Moments::default();
         for patch in patches(image, width).filter(|p| !p.coarse) {
             let near = || patch.pixels.iter().filter(|i| image[**i].abs() < CUT * patch.sigma);
             let (n, square) = near()
@@ -63,15 +62,14 @@ impl Moments {
                 // A single value has no skewness.
                 if spread > 0.0 {
                     let third = |i: &usize| ((unit[*i] - mean) / spread).powi(3);
-                    sums.readings += n;
-                    sums.thirds += near().map(third).sum::<f64>();
+                    self.readings += n;
+                    self.thirds += near().map(third).sum::<f64>();
                 }
                 // Both residuals of a pair are in units of this patch's standard deviation.
-                sums.add_pairs(&unit, width, &patch.pixels);
+                self.add_pairs(&unit, width, &patch.pixels);
                 near().for_each(|i| unit[*i] = f64::NAN);
             }
         }
-        sums
     }
 
     fn add_pairs(&mut self, unit: &[f64], width: usize, pixels: &[usize]) {
@@ -87,17 +85,6 @@ impl Moments {
                     sums.products_of_squares += xx * yy;
                 }
             }
-        }
-    }
-
-    pub fn add(&mut self, other: &Moments) {
-        self.readings += other.readings;
-        self.thirds += other.thirds;
-        for (mine, other) in self.pairs.iter_mut().zip(&other.pairs) {
-            mine.pairs += other.pairs;
-            mine.fourth += other.fourth;
-            mine.products += other.products;
-            mine.products_of_squares += other.products_of_squares;
         }
     }
 
@@ -117,6 +104,15 @@ impl Moments {
         };
         let all: Option<Vec<f64>> = self.pairs.iter().map(of).collect();
         all.map(|all| all.iter().sum::<f64>() / all.len() as f64)
+    }
+}
+
+#[cfg(test)]
+impl Moments {
+    pub fn of(image: &[f32], width: usize) -> Self {
+        let mut sums = Moments::default();
+        sums.add(image, width);
+        sums
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::tail_counts::{TAIL_EDGES, TailCounts};
 use crate::diagnose::search::posterior::Posterior;
-use crate::stats::normal_beyond;
+use crate::stats::{even, normal_beyond};
 
 /// Fraction and scale of the far errors, each with its standard error. The scale is their standard
 /// deviation over that of the noise.
@@ -40,13 +40,9 @@ pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
     if more <= 0.0 || counts.n <= 0.0 {
         return None;
     }
-    let log = |k: usize| {
-        let share = k as f64 / (SCALES - 1) as f64;
-        REACH[0].ln() + (REACH[1] / REACH[0]).ln() * share
-    };
     let mut nodes: Vec<[f64; 3]> = Vec::new();
     for form in FORMS {
-        for scale in (0..SCALES).map(|k| log(k).exp()) {
+        for scale in even(REACH.map(f64::ln), SCALES).map(f64::exp) {
             let beyond = |edge: f64| form(edge / scale);
             let inside = beyond(TAIL_EDGES[0]) - beyond(TAIL_EDGES[TAIL_EDGES.len() - 1]);
             if inside <= 0.0 {

@@ -22,7 +22,7 @@ fn rounding_lowers_no_share_that_stands_still() {
     const SIDE: usize = 120;
     const STILL: f64 = 0.5;
     const STEP_PX: f64 = 0.125;
-    for steps in [0.6, 0.8, 1.5] {
+    for steps in [0.35, 0.6, 0.8, 1.5] {
         let view = |seed: u64| {
             let mut rng = Seed(seed).stream("structure/rounding");
             let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -45,6 +45,8 @@ fn rounding_lowers_no_share_that_stands_still() {
             assert!((share - STILL).abs() < 0.008, "{share} at lag {lag}, {steps} steps");
         }
     }
+    let rounded = |steps: f64| before_rounding(0.4, 1.0, steps.powi(2) + 1.0 / 12.0);
+    assert!(rounded(0.3).is_some() && rounded(0.28).is_none());
 }
 
 /// A square of white pixels whose rows share an error half as large: variance of a row's mean, and of its

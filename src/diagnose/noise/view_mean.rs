@@ -92,6 +92,9 @@ impl ViewMean {
 
     /// One-sided p-value of a mean this far above `expected`, by Student's t.
     pub fn p_above(&self, expected: f64) -> f64 {
+        if self.std_error.is_nan() {
+            return 1.0;
+        }
         let t = (self.value - expected) / self.std_error.max(1e-12 * self.value.abs()).max(1e-300);
         student_upper(t, self.freedom).max(1e-300)
     }

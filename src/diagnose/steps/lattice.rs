@@ -6,6 +6,7 @@ use super::comb::{
     steps_of_disparities, steps_of_words,
 };
 use crate::frame::DepthCode;
+use crate::stats::gcd;
 use crate::view::Sensor;
 
 /// Number of times each raw word occurs on the targets.
@@ -67,7 +68,10 @@ impl RawHistogram {
 
     /// Counts the words of a picture.
     pub fn count(&mut self, words: impl Iterator<Item = u16>) {
-        words.for_each(|w| self.0[usize::from(w)] += 1);
+        for w in words {
+            let count = &mut self.0[usize::from(w)];
+            *count = count.saturating_add(1);
+        }
     }
 
     /// Whether there are too few distinct words for their counts to show a lattice.
@@ -211,10 +215,6 @@ impl RawHistogram {
 fn all_multiples(step: usize, words: usize) -> f64 {
     let (step, n) = (step as f64, words as f64);
     (step.powf(-n) * (1.0 + step / (n - 1.0).max(1.0))).clamp(f64::MIN_POSITIVE, 1.0)
-}
-
-fn gcd(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 #[cfg(test)]

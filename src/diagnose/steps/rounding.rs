@@ -4,8 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::lattice::Step;
-use crate::diagnose::views::field::Field;
-use crate::stats::mean;
+use crate::stats::bisect;
 use crate::terms::{GroupMean, PixelContext};
 
 /// Steps of the stored depths, whose waves the searches of the mean and of the noise fit in each view.
@@ -98,11 +97,16 @@ pub fn share_of_rounding(step_px: f64, variance: f64) -> f64 {
     (step_px.powi(2) / 12.0 / variance.max(1e-12)).min(MAX_SHARE)
 }
 
-/// Correlation of a view's frames because they are rounded to the same steps.
-pub fn rounded_alike(field: &Field) -> f64 {
-    // Sigma is smooth.
-    let some = field.sigma.iter().step_by(16).map(|s| f64::from(*s).powi(2));
-    mean(some.map(|variance| still_share(field.step_px, variance))).unwrap_or(0.0)
+/// Correlation before rounding of two frames whose words, of this step and variance (px^2), correlate by
+/// `stored`. `None` where rounding is more than half of the variance: in a target that lies in one step its error
+/// does not vary from pixel to pixel, and this correlation would then be wrong by more than .02.
+pub fn before_rounding(stored: f64, step_px: f64, variance: f64) -> Option<f64> {
+    if step_px <= 0.0 {
+        return Some(stored);
+    }
+    let r2 = noise(step_px, variance);
+    let words = |rho: f64| (r2 * rho + rounded_alike(r2 * (1.0 - rho))) / (r2 + 1.0 / 12.0);
+    (r2 > 1.0 / 12.0).then(|| bisect([-1.0, 1.0], |rho| words(rho) < stored)[0])
 }
 
 /// Share of the noise variance (px^2) that all frames have in common where they are rounded to this step.
@@ -111,7 +115,13 @@ fn still_share(step_px: f64, variance: f64) -> f64 {
         return 0.0;
     }
     let r2 = noise(step_px, variance);
-    0.5 * wave(1.0, r2).powi(2) / (r2 + 1.0 / 12.0)
+    rounded_alike(r2) / (r2 + 1.0 / 12.0)
+}
+
+/// Covariance, steps^2, of the errors of rounding two readings of a pixel that differ by noise of variance
+/// 2 `r2`, steps^2.
+fn rounded_alike(r2: f64) -> f64 {
+    [1.0, 2.0, 3.0, 4.0].map(|k| 0.5 * wave(k, r2).powi(2)).iter().sum()
 }
 
 /// Variance of the noise before it is rounded, steps^2; sigma holds the error of rounding.
@@ -137,6 +147,7 @@ fn averaged(frequency: f64, side: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::mean;
 
     const STEP: f64 = 0.13;
 
