@@ -67,7 +67,7 @@ fn page(card: &Card) -> String {
 }
 
 fn parameter(p: &Parameter, identity: Option<f64>) -> String {
-    let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+    let unit = if p.unit().is_empty() { String::new() } else { format!(" {}", p.unit()) };
     let off = identity.map_or(String::new(), |value| format!(", off at {value}"));
     let [low, high] = p.range;
     format!("{} = {low} to {high}{unit}, typical {}{off}: {}", p.name, p.typical, p.summary)
@@ -102,7 +102,7 @@ fn wrap(text: &str, page: &mut String) {
 }
 
 fn as_json(card: &Card) -> serde_json::Value {
-    let parameter = |p: &Parameter| json!({"name": p.name, "unit": p.unit, "range": p.range, "typical": p.typical, "words": p.summary});
+    let parameter = |p: &Parameter| json!({"name": p.name, "unit": p.unit(), "range": p.range, "typical": p.typical, "words": p.summary});
     json!({
         "id": card.id,
         "words": card.summary,

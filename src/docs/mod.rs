@@ -21,7 +21,7 @@ mod tests {
     use crate::measure::write_measurements;
 
     fn knob(p: &Parameter) -> String {
-        let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+        let unit = if p.unit().is_empty() { String::new() } else { format!(" {}", p.unit()) };
         format!("`{}` ({}{unit})", p.name, p.typical)
     }
 

@@ -93,7 +93,8 @@ impl Active {
         if !(low..=high).contains(&value) {
             return Err(fault(format!(
                 "effect {}: {key} = {value} is outside {low} to {high} {}",
-                card.id, p.unit
+                card.id,
+                p.unit()
             )));
         }
         self.settings.0[index] = value;

@@ -13,7 +13,6 @@ pub(super) static CARD: Card = Card {
     summary: "light of the room adds to the pattern and brings its own shot noise: the farther the target, the fainter the pattern against it",
     parameters: &[Parameter {
         name: "ratio",
-        unit: "",
         range: [0.0, 100.0],
         typical: 0.05,
         summary: "light of a room of 500 lx over the pattern's, on a surface facing the sensor at 1 m",

@@ -57,12 +57,22 @@ impl Stage {
 pub struct Parameter {
     /// As given on the command line; it ends with the unit.
     pub name: &'static str,
-    pub unit: &'static str,
     /// Accepted values.
     pub range: [f64; 2],
     /// Typical value, used where the user gives none.
     pub typical: f64,
     pub summary: &'static str,
+}
+
+impl Parameter {
+    /// Unit, as the name ends with it; empty where it is a number.
+    pub fn unit(&self) -> &'static str {
+        match self.name.rsplit_once('_') {
+            Some((_, "mps")) => "m/s",
+            Some((_, unit @ ("px" | "m" | "s" | "deg"))) => unit,
+            _ => "",
+        }
+    }
 }
 
 /// Values of an effect's parameters, in the card's order.

@@ -19,21 +19,18 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "amplitude_px",
-            unit: "px",
             range: [0.0, 1.0],
             typical: 0.0625,
             summary: "half the height of a tooth: half a step of the read-out",
         },
         Parameter {
             name: "period_px",
-            unit: "px",
             range: [2.0, 640.0],
             typical: 80.0,
             summary: "columns from one step to the next",
         },
         Parameter {
             name: "spread",
-            unit: "",
             range: [1.0, 20.0],
             typical: 1.0,
             summary: "the largest period of a view over the smallest; above 1 every view has its own, with a step in the middle",

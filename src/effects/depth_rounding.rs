@@ -11,7 +11,6 @@ pub(super) static CARD: Card = Card {
     summary: "the driver stores depth in whole steps of a constant size: the same gaps at every distance",
     parameters: &[Parameter {
         name: "step_m",
-        unit: "m",
         range: [0.0, 0.1],
         typical: 0.001,
         summary: "one step of the stored depth",

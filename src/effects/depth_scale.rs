@@ -12,7 +12,6 @@ pub(super) static CARD: Card = Card {
     summary: "focal length or baseline are wrong: every depth is off by the same factor; only reference distances show it",
     parameters: &[Parameter {
         name: "scale",
-        unit: "",
         range: [0.5, 2.0],
         typical: 1.035,
         summary: "stored depth over true depth",

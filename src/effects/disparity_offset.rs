@@ -14,7 +14,6 @@ pub(super) static CARD: Card = Card {
     summary: "the stored reference pattern stands at another distance than the firmware believes: every disparity is shifted by a constant, and depth errs with z^2; only reference distances show it",
     parameters: &[Parameter {
         name: "offset_px",
-        unit: "px",
         range: [-4.0, 4.0],
         typical: 0.1,
         summary: "added to every disparity: positive brings things nearer",

@@ -12,7 +12,6 @@ pub(super) static CARD: Card = Card {
     summary: "the matcher answers in steps of a fraction of a pixel: only some depths occur, their gaps growing with z^2",
     parameters: &[Parameter {
         name: "step_px",
-        unit: "px",
         range: [0.0, 4.0],
         typical: 0.125,
         summary: "one step of the disparity",

@@ -12,7 +12,6 @@ pub(super) static CARD: Card = Card {
     summary: "at the edge of the target a pixel sees both the target and what is behind, and answers between the two; there must be something behind the target",
     parameters: &[Parameter {
         name: "width_px",
-        unit: "px",
         range: [0.0, 32.0],
         typical: 2.0,
         summary: "distance from the edge at which a pixel sees one surface only",

@@ -11,7 +11,6 @@ pub(super) static CARD: Card = Card {
     summary: "each pixel has a constant error of disparity of its own, the same in every view of this unit",
     parameters: &[Parameter {
         name: "sigma_px",
-        unit: "px",
         range: [0.0, 4.0],
         typical: 0.05,
         summary: "standard deviation over the pixels",

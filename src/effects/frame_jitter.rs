@@ -11,7 +11,6 @@ pub(super) static CARD: Card = Card {
     summary: "the whole frame is shifted as one, afresh in each frame: vibration, or a reference that trembles",
     parameters: &[Parameter {
         name: "sigma_px",
-        unit: "px",
         range: [0.0, 4.0],
         typical: 0.03,
         summary: "standard deviation of the shift",

@@ -11,7 +11,6 @@ pub(super) static CARD: Card = Card {
     summary: "the grain of laser light stands still while the scene does: part of the noise is the same in every frame of a view and another in the next view",
     parameters: &[Parameter {
         name: "fraction",
-        unit: "",
         range: [0.0, 1.0],
         typical: 0.8,
         summary: "of the variance that stands still",

@@ -12,21 +12,18 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "share",
-            unit: "",
             range: [0.0, 1.0],
             typical: 1.0,
             summary: "of the pixels well beyond the angle that are lost",
         },
         Parameter {
             name: "theta50_deg",
-            unit: "deg",
             range: [0.0, 90.0],
             typical: 75.0,
             summary: "tilt at which half of that share is lost",
         },
         Parameter {
             name: "width_deg",
-            unit: "deg",
             range: [0.0, 45.0],
             typical: 2.0,
             summary: "how gradual: from a quarter to three quarters over 2.2 times this",

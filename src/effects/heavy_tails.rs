@@ -12,14 +12,12 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "fraction",
-            unit: "",
             range: [0.0, 1.0],
             typical: 0.02,
             summary: "of the pixels, afresh in every frame",
         },
         Parameter {
             name: "scale",
-            unit: "",
             range: [1.0, 100.0],
             typical: 5.0,
             summary: "how many times wider their errors are",

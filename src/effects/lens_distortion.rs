@@ -14,7 +14,6 @@ pub(super) static CARD: Card = Card {
     summary: "the lens bends rays, so that a pixel looks elsewhere than the pinhole says, which tilted planes show; a matcher that looks through it also finds its shifts against the reference stretched",
     parameters: &[Parameter {
         name: "k1",
-        unit: "",
         range: [-0.2, 0.2],
         typical: -0.05,
         summary: "radial coefficient of Brown and Conrady that the calibration lacks",

@@ -12,7 +12,6 @@ pub(super) static CARD: Card = Card {
     summary: "what the target hides from the projector has no pattern and no depth: a band on the background beside the target, fx b (1/z - 1/z_behind) px wide, on one side; there must be something behind the target",
     parameters: &[Parameter {
         name: "share",
-        unit: "",
         range: [0.0, 1.0],
         typical: 1.0,
         summary: "of the baseline between camera and projector",

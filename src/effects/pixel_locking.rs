@@ -16,7 +16,6 @@ pub(super) static CARD: Card = Card {
     summary: "interpolating the peak of the match leans toward whole pixels: an error periodic in disparity, one wave a pixel, seen as contour lines on tilted planes",
     parameters: &[Parameter {
         name: "amplitude_px",
-        unit: "px",
         range: [0.0, 0.5],
         typical: 0.05,
         summary: "height of the wave",

@@ -14,7 +14,6 @@ pub(super) static CARD: Card = Card {
     summary: "lens or projector off their calibration by a smooth bowl of disparity about the principal point: in depth it grows with z^2",
     parameters: &[Parameter {
         name: "k_px",
-        unit: "px",
         range: [-4.0, 4.0],
         typical: 0.5,
         summary: "disparity too large by this at the corner radius",

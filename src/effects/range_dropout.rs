@@ -12,21 +12,18 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "share",
-            unit: "",
             range: [0.0, 1.0],
             typical: 1.0,
             summary: "of the pixels well beyond the distance that are lost",
         },
         Parameter {
             name: "z50_m",
-            unit: "m",
             range: [0.0, 20.0],
             typical: 4.0,
             summary: "depth at which half of that share is lost",
         },
         Parameter {
             name: "width_m",
-            unit: "m",
             range: [-2.0, 2.0],
             typical: 0.1,
             summary: "how gradual: from a quarter to three quarters over 2.2 times this; negative loses what is nearer",

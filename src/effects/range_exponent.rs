@@ -13,7 +13,6 @@ pub(super) static CARD: Card = Card {
     summary: "noise grows with another power of the distance than the form allows",
     parameters: &[Parameter {
         name: "excess",
-        unit: "",
         range: [-4.0, 4.0],
         typical: 0.5,
         summary: "added to the exponent of z; nothing changes at 2 m",

@@ -13,7 +13,6 @@ pub(super) static CARD: Card = Card {
     summary: "the file holds the length of the ray where depth along the axis is expected: a flat wall becomes a bowl",
     parameters: &[Parameter {
         name: "share",
-        unit: "",
         range: [0.0, 1.0],
         typical: 1.0,
         summary: "how much of the ray length over the depth is in the file",

@@ -11,7 +11,6 @@ pub(super) static CARD: Card = Card {
     summary: "a row of the picture is read as one and shifted as one, afresh in each frame",
     parameters: &[Parameter {
         name: "sigma_px",
-        unit: "px",
         range: [0.0, 4.0],
         typical: 0.03,
         summary: "standard deviation of the shift",

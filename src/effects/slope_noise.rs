@@ -14,7 +14,6 @@ pub(super) static CARD: Card = Card {
     summary: "a pixel does not know to a fraction where it looks: on a slope that is an error of depth, growing with z tan(theta)",
     parameters: &[Parameter {
         name: "sigma_lateral_px",
-        unit: "px",
         range: [0.0, 10.0],
         typical: 0.8,
         summary: "standard deviation of the place a pixel looks at",

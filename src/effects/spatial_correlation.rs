@@ -12,14 +12,12 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "length_px",
-            unit: "px",
             range: [0.0, 64.0],
             typical: 9.0,
             summary: "side of the window: beyond it neighbours are independent",
         },
         Parameter {
             name: "share",
-            unit: "",
             range: [0.0, 1.0],
             typical: 1.0,
             summary: "of the variance that comes through the window; the rest is each pixel's own",

@@ -16,14 +16,12 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "sagitta_m",
-            unit: "m",
             range: [-0.1, 0.1],
             typical: 0.004,
             summary: "rise of the middle over the ends, towards the sensor",
         },
         Parameter {
             name: "span_m",
-            unit: "m",
             range: [0.05, 20.0],
             typical: 1.0,
             summary: "width of the board over which it is counted",

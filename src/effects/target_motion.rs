@@ -11,7 +11,6 @@ pub(super) static CARD: Card = Card {
     summary: "target or sensor moved along the optical axis while the view was taken: frames disagree, and their mean is off",
     parameters: &[Parameter {
         name: "velocity_mps",
-        unit: "m/s",
         range: [-1.0, 1.0],
         typical: 0.005,
         summary: "of the target away from the sensor",

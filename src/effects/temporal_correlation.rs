@@ -11,7 +11,6 @@ pub(super) static CARD: Card = Card {
     summary: "the firmware carries part of a frame over into the next: noise stays the same size and hangs together over frames",
     parameters: &[Parameter {
         name: "rho",
-        unit: "",
         range: [0.0, 0.999],
         typical: 0.5,
         summary: "correlation of a pixel's noise from one frame to the next",

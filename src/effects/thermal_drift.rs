@@ -13,14 +13,12 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "relative",
-            unit: "",
             range: [-0.2, 0.2],
             typical: 0.005,
             summary: "change of depth in the end, as a share of it",
         },
         Parameter {
             name: "time_constant_s",
-            unit: "s",
             range: [1.0, 100000.0],
             typical: 900.0,
             summary: "time after which 63 % of it has come",

@@ -13,7 +13,6 @@ pub(super) static CARD: Card = Card {
     summary: "tilt along the baseline stretches the pattern in the matching window, tilt across it only shears it: the first is noisier",
     parameters: &[Parameter {
         name: "ratio",
-        unit: "",
         range: [0.2, 5.0],
         typical: 1.5,
         summary: "sigma at 60 degrees of tilt along the baseline over across it",

@@ -13,7 +13,6 @@ pub(super) static CARD: Card = Card {
     summary: "less light reaches the corners of the picture, and less light is more noise",
     parameters: &[Parameter {
         name: "growth",
-        unit: "",
         range: [0.0, 10.0],
         typical: 0.5,
         summary: "by how much sigma is larger at the corner radius, as a share",

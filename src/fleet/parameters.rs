@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::curve::{Curve, same};
-use crate::effects::find;
+use crate::effects::{Parameter, find};
 use crate::model::{Effect, UNEXPLAINED};
 use crate::stats::RandomEffects;
 
@@ -84,7 +84,7 @@ fn by_id(id: &str, units: &[(String, &[Effect])]) -> SharedEffect {
 
 fn unit_of(id: &str, parameter: &str) -> &'static str {
     let known = find(id).and_then(|e| e.card().parameters.iter().find(|p| p.name == parameter));
-    known.map_or("", |p| p.unit)
+    known.map_or("", Parameter::unit)
 }
 
 fn weigh(parameter: &mut SharedParameter) {

@@ -17,14 +17,12 @@ pub(super) static CARD: Card = Card {
     parameters: &[
         Parameter {
             name: "amplitude_px",
-            unit: "px",
             range: [0.0, 1.0],
             typical: 0.1,
             summary: "height of the hum above its mean",
         },
         Parameter {
             name: "period_px",
-            unit: "px",
             range: [2.0, 480.0],
             typical: 30.0,
             summary: "rows from one wave to the next",
