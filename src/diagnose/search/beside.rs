@@ -18,14 +18,9 @@ impl Beside {
         if chosen == 0 {
             return Some(Beside { chosen, fit: None });
         }
-        let mut own = DMatrix::identity(chosen, chosen) * prior;
-        let mut shared = DMatrix::zeros(chosen, k);
-        for v in views {
-            own += v.a.view((0, 0), (chosen, chosen));
-            shared += v.a.view((0, chosen), (chosen, k));
-        }
-        let factor = own.cholesky()?;
-        let explained = factor.solve(&shared);
+        let all = Evidence::sum(chosen + k, prior, views).a;
+        let factor = all.view((0, 0), (chosen, chosen)).into_owned().cholesky()?;
+        let explained = factor.solve(&all.view((0, chosen), (chosen, k)));
         Some(Beside { chosen, fit: Some((factor, explained)) })
     }
 

@@ -30,11 +30,15 @@ impl Evidence {
         Evidence { a: DMatrix::from_element(1, 1, a), b: DVector::from_element(1, b) }
     }
 
+    /// Evidence on the first `n` columns only.
+    pub fn first(&self, n: usize) -> Self {
+        Evidence { a: self.a.view((0, 0), (n, n)).into_owned(), b: self.b.rows(0, n).into_owned() }
+    }
+
     /// Keeps the first `n` columns only.
     pub fn truncate(&mut self, n: usize) {
         if n < self.b.len() {
-            self.a = self.a.view((0, 0), (n, n)).into_owned();
-            self.b = self.b.rows(0, n).into_owned();
+            *self = self.first(n);
         }
     }
 

@@ -39,7 +39,7 @@ use choose::Choice;
 use evidence::{Evidence, fit, gain};
 use layer_null::{Group, LayerNull};
 use outcome::{Chosen, Look, Outcome, bases, bases_where};
-use prepared::{Grouping, Patches, Prepared, Together, merge_by, prepare};
+use prepared::{Grouping, Prepared, Together, merge_by, prepare};
 use rows::Rows;
 use rules::Rules;
 use trial::{Judged, Trial, looks, nests};
@@ -187,18 +187,11 @@ impl<'a> Layer<'a> {
     fn trial(&self, chosen: &[Chosen]) -> Option<Trial<'_>> {
         let beside: Vec<Chosen> = self.pinned.iter().chain(chosen).cloned().collect();
         let views = self.prepare(&beside);
-        let settled = views.first()?.beside(Patches::Coarse).b.len();
-        let base = |patches| {
-            let evidence: Vec<Evidence> = views.iter().map(|v| v.beside(patches)).collect();
-            gain(&evidence, self.rules.prior)
-        };
-        let base = match self.pinned {
-            None => Some([base(Patches::Fine)?, base(Patches::Coarse)?]),
-            Some(_) => None,
-        };
+        let settled = bases_where(&beside, |c| c.family.is_some()).iter().map(|b| b.count()).sum();
         let Layer { rules, largest, .. } = *self;
         let weight = self.together.coarse.iter().flat_map(|v| &v.weight).sum();
-        Some(Trial { beside, views, settled, base, weight, rules, largest })
+        let is_pinned = self.pinned.is_some();
+        Some(Trial { beside, views, settled, is_pinned, weight, rules, largest })
     }
 
     /// Returns the best candidate given `chosen` and the pinned term, if its gain exceeds the noise

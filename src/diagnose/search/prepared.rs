@@ -209,40 +209,22 @@ impl Grouping {
     }
 }
 
-/// Which samples a basis is tried on; the terms alongside gain more on the fine ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Patches {
-    Fine,
-    Coarse,
-}
-
 impl Prepared<'_> {
-    /// Samples that a basis is tried on, and their kind.
-    pub(super) fn samples(&self, basis: &Basis) -> (&[PixelContext], &Rows<'_>, Patches) {
+    /// Samples that a basis is tried on.
+    pub(super) fn samples(&self, basis: &Basis) -> (&[PixelContext], &Rows<'_>) {
         let alone = basis.alone().and_then(|over| self.groups.iter().find(|g| g.0.over == over));
         if let Some((group, rows)) = alone {
-            (&group.places, rows, Patches::Fine)
+            (&group.places, rows)
         } else if let Some((places, rows)) = self.fine.as_ref().filter(|_| basis.needs_tiles()) {
-            (places, rows, Patches::Fine)
+            (places, rows)
         } else {
-            (self.coarse.0, &self.coarse.1, Patches::Coarse)
+            (self.coarse.0, &self.coarse.1)
         }
-    }
-
-    pub fn patches(&self, basis: &Basis) -> Patches {
-        self.samples(basis).2
-    }
-
-    /// Evidence on the terms fitted alongside every candidate; grouping the fine samples does not
-    /// change it.
-    pub fn beside(&self, patches: Patches) -> Evidence {
-        let fine = self.groups.first().filter(|_| patches == Patches::Fine);
-        fine.map_or(&self.coarse.1, |(_, rows)| rows).reduce(0, |_, _| ())
     }
 
     /// Evidence on the terms fitted alongside and the basis.
     pub fn evidence(&self, basis: &Basis) -> Evidence {
-        let (places, rows, _) = self.samples(basis);
+        let (places, rows) = self.samples(basis);
         rows.evidence(basis, places)
     }
 }

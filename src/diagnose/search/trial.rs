@@ -10,7 +10,7 @@ use super::layer_null::{Group, LayerNull};
 use super::noise_gains::REPLICATES;
 use super::null::Null;
 use super::outcome::{Chosen, Look};
-use super::prepared::{Patches, Prepared};
+use super::prepared::Prepared;
 use super::rules::Rules;
 use super::view_noise::Scores;
 use crate::rng::Seed;
@@ -22,11 +22,10 @@ pub struct Trial<'a> {
     pub views: Vec<Prepared<'a>>,
     /// Columns of the terms fitted alongside.
     pub settled: usize,
-    /// Gain of those terms without the candidate, on fine and on coarse patches. `None` where a term is
-    /// pinned: it and the named terms are then fitted to all views, including the left-out ones. Fitted
-    /// to the others alone, a free surface goes astray where one view reaches farther than they do, and
-    /// a candidate that bends it back would seem to be found.
-    pub base: Option<[Gain; 2]>,
+    /// Whether a term is pinned: it and the named terms are then fitted to all views, including the left-out
+    /// ones. Fitted to the others alone, a free surface goes astray where one view reaches farther than they
+    /// do, and a candidate that bends it back would seem to be found.
+    pub is_pinned: bool,
     /// Total weight of the samples.
     pub weight: f64,
     pub rules: &'a Rules,
@@ -59,10 +58,6 @@ impl NestNoise {
 }
 
 impl Trial<'_> {
-    fn patches(&self, c: &Candidate) -> Option<Patches> {
-        Some(self.views.first()?.patches(&c.basis))
-    }
-
     /// Draws the noise of all views, and scores each nest's widest candidate on it.
     pub fn noise(
         &self,
@@ -101,30 +96,36 @@ impl Trial<'_> {
         let Some(widest) = open().next() else { return Vec::new() };
         let of_widest = |v: &Prepared<'_>| v.evidence(&candidates[widest].basis);
         let mut evidence: Vec<Evidence> = self.views.iter().map(of_widest).collect();
+        let before = if self.is_pinned {
+            None
+        } else {
+            let alongside: Vec<Evidence> = evidence.iter().map(|e| e.first(self.settled)).collect();
+            gain(&alongside, self.rules.prior)
+        };
         let judged = |k: usize| {
             let c = &candidates[k];
             evidence.iter_mut().for_each(|e| e.truncate(self.settled + c.basis.count()));
-            Some((k, self.judged_by(c, &evidence, noise)?))
+            Some((k, self.judged_by(c, &evidence, before.as_ref(), noise)?))
         };
         open().filter_map(judged).collect()
     }
 
+    /// Judges a candidate by the views' evidence on it and the terms alongside, which gained so much `before`.
     fn judged_by(
         &self,
         c: &Candidate,
         evidence: &[Evidence],
+        before: Option<&Gain>,
         noise: Option<&NestNoise>,
     ) -> Option<Judged> {
         let (m, prior) = (self.settled, self.rules.prior);
         let beside = Beside::of(evidence, m, prior)?;
         let alone = beside.alone(evidence);
         let null = Null::of_candidate(&alone, prior)?;
-        let gain = match &self.base {
-            None => gain(&alone, prior)?,
-            Some([fine, coarse]) => gain(evidence, prior)?.over(match self.patches(c)? {
-                Patches::Fine => fine,
-                Patches::Coarse => coarse,
-            }),
+        let gain = if self.is_pinned {
+            gain(&alone, prior)?
+        } else {
+            gain(evidence, prior)?.over(before?)
         };
         if !c.agrees(own(&gain, &c.basis)) {
             return None;

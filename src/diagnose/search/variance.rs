@@ -136,7 +136,7 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
     let (z_m, theta_rad) = table_reach(reach);
     let table = |model: &SigmaModel| log_variances(model, z_m, theta_rad);
     let base = table(sigma);
-    let columns: Vec<Vec<f64>> = (0..sigma.parameters.len())
+    let columns: Vec<(usize, Vec<f64>)> = (0..sigma.parameters.len())
         .filter_map(|j| {
             let mut moved = sigma.clone();
             // One per cent of the parameter.
@@ -144,13 +144,14 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
             moved.parameters[j] += step;
             let column: Vec<f64> =
                 table(&moved).iter().zip(&base).map(|(m, b)| (m - b) / 0.01).collect();
-            tells(&column).then_some(column)
+            tells(&column).then_some((j, column))
         })
         .collect();
-    let few = columns.len().min(3);
     // Large changes are not linear: the level parameters by about a third up and down.
-    let bent: Vec<Vec<f64>> = (0..few)
-        .flat_map(|j| [0.7, 1.4].map(|factor| (j, factor)))
+    let frontal: Vec<&(usize, Vec<f64>)> = columns.iter().filter(|(j, _)| *j < 3).collect();
+    let bent: Vec<Vec<f64>> = frontal
+        .iter()
+        .flat_map(|(j, _)| [0.7, 1.4].map(|factor| (*j, factor)))
         .filter_map(|(j, factor)| {
             let mut moved = sigma.clone();
             moved.parameters[j] *= factor;
@@ -160,13 +161,15 @@ fn recalibrations(reach: &Extent, sigma: &SigmaModel) -> Vec<Candidate> {
         .collect();
     // A single wrong parameter is as simple as a formula of one.
     let moved = moved_depths(sigma, z_m, theta_rad);
+    let level = (frontal.len() < columns.len())
+        .then(|| frontal.iter().map(|(_, column)| column.clone()).collect());
+    let columns: Vec<Vec<f64>> = columns.into_iter().map(|(_, column)| column).collect();
     let alone = columns.iter().cloned().chain(moved).map(|column| vec![column]);
-    let level = (few < columns.len()).then(|| columns[..few].to_vec());
     std::iter::once(bent)
         .chain(alone)
         .chain(level)
         .chain([columns.clone()])
-        .filter(|columns| !columns.is_empty())
+        .filter(|columns: &Vec<Vec<f64>>| !columns.is_empty())
         .map(|columns| Basis::Table { z_m, theta_rad, columns })
         .map(|table| Candidate::named(RECALIBRATE, table))
         .collect()

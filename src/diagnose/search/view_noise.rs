@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::evidence::root;
-use super::prepared::{Grouping, Patches, Prepared, fill_all};
+use super::prepared::{Grouping, Prepared, fill_all};
 use super::rows::Rows;
 use crate::rng::Stream;
 use crate::terms::{Basis, PixelContext};
@@ -140,16 +140,16 @@ impl Prepared<'_> {
         basis: &Basis,
         noise: &'n ViewNoise,
     ) -> Option<(&[PixelContext], &Rows<'_>, &'n DMatrix<f64>)> {
-        let (places, rows, patches) = self.samples(basis);
+        let (places, rows) = self.samples(basis);
         let group = self.groups.iter().position(|(_, of)| std::ptr::eq(of, rows));
         // The scores of the terms alongside are those of the coarse samples' noise.
         let is_joint = self.is_one_size || noise.beside.is_empty();
-        let drawn = match (patches, group) {
-            (Patches::Coarse, _) => &noise.samples,
-            (Patches::Fine, Some(g)) => Some(&noise.groups[g]).filter(|_| is_joint)?,
-            (Patches::Fine, None) => Some(&noise.samples).filter(|_| self.is_one_size)?,
+        let is_drawn = self.is_one_size || std::ptr::eq(rows, &self.coarse.1);
+        let drawn = match group {
+            Some(g) => Some(&noise.groups[g]).filter(|_| is_joint),
+            None => Some(&noise.samples).filter(|_| is_drawn),
         };
-        Some((places, rows, drawn))
+        Some((places, rows, drawn?))
     }
 }
 
