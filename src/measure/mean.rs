@@ -29,18 +29,23 @@ pub(super) fn mean_inverse_depth(
         f32::max(STRAY_SIGMAS * usual, STRAY_STEPS * bench.step(words_a_step, f64::from(w)) as f32)
     };
     let frames = &of_one_scene(frames, &asked, far)[..];
-    let seen = Seen::of(frames, &bench.table);
+    let mut w: Vec<f32> = Vec::with_capacity(frames.len());
     let mean = |i: usize| {
-        let (n, low, high) = (usize::from(seen.count[i]), seen.low[i], seen.high[i]);
+        w.clear();
+        w.extend(
+            frames.iter().map(|f| 1.0 / bench.table.metres(f.raw[i])).filter(|w| w.is_finite()),
+        );
+        let n = w.len();
         if n == 0 || 2 * n < frames.len() {
             return f32::NAN;
         }
+        let [low, high] = w.iter().fold([f32::INFINITY, 0.0], |[a, b], w| [a.min(*w), b.max(*w)]);
         if n >= MAJORITY && high - low > STRAY_SIGMAS * usual && high - low > far(low) {
-            return without_strays(readings(frames, &bench.table, i), far(low));
+            return without_strays(w.clone(), far(low));
         }
-        seen.sum[i] / f32::from(seen.count[i])
+        w.iter().sum::<f32>() / n as f32
     };
-    (0..seen.sum.len()).map(mean).collect()
+    (0..frames[0].raw.len()).map(mean).collect()
 }
 
 /// Samples pixels spread over the picture: for each, the median over the frames, 1/m, and each frame's
@@ -78,12 +83,6 @@ fn of_one_scene<'f>(
     if 2 * kept.len() > frames.len() { kept } else { frames.iter().collect() }
 }
 
-/// Inverse depths of a pixel over the frames, 1/m.
-fn readings(frames: &[&Frame], table: &DepthTable, pixel: usize) -> Vec<f32> {
-    let w = frames.iter().map(|f| 1.0 / table.metres(f.raw[pixel]));
-    w.filter(|w| w.is_finite()).collect()
-}
-
 /// Typical standard deviation of a reading about its pixel's median, 1/m: the median over the picture.
 fn usual_scatter(asked: &[(f32, Vec<f32>)]) -> f32 {
     let off = asked.iter().flat_map(|(_, off)| off).map(|off| off.abs());
@@ -98,38 +97,6 @@ fn without_strays(mut w: Vec<f32>, far: f32) -> f32 {
     let far = far.max(STRAY_SIGMAS * MAD_TO_SIGMA as f32 * median_in_place(&mut off));
     w.retain(|w| (w - median).abs() <= far);
     w.iter().sum::<f32>() / w.len() as f32
-}
-
-/// Statistics of each pixel's inverse depths over the frames, 1/m.
-struct Seen {
-    sum: Vec<f32>,
-    count: Vec<u8>,
-    low: Vec<f32>,
-    high: Vec<f32>,
-}
-
-impl Seen {
-    fn of(frames: &[&Frame], table: &DepthTable) -> Self {
-        let n = frames[0].raw.len();
-        let mut seen = Seen {
-            sum: vec![0.0; n],
-            count: vec![0; n],
-            low: vec![f32::INFINITY; n],
-            high: vec![0.0; n],
-        };
-        for frame in frames {
-            for (i, &raw) in frame.raw.iter().enumerate() {
-                let w = 1.0 / table.metres(raw);
-                if w.is_finite() {
-                    seen.sum[i] += w;
-                    seen.count[i] += 1;
-                    seen.low[i] = seen.low[i].min(w);
-                    seen.high[i] = seen.high[i].max(w);
-                }
-            }
-        }
-        seen
-    }
 }
 
 #[cfg(test)]

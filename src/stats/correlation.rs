@@ -1,6 +1,6 @@
 //! Effective number of independent samples in a patch of correlated pixels.
 
-use super::{MAD_TO_SIGMA, median_in_place};
+use super::{MAD_TO_SIGMA, coprime, median_in_place};
 
 /// Spatial correlation of a residual image, summed along columns and rows.
 ///
@@ -81,11 +81,6 @@ pub fn measure_correlation(field: &[f32], width: usize) -> Correlation {
     }
 }
 
-/// Greatest common divisor.
-fn gcd(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { gcd(b, a % b) }
-}
-
 /// Correlation at lags 0, 1, 2 ... until it dies out, and that of the squares; `partner(i, u, lag)` is the
 /// value `lag` px from sample `i` of column `u`.
 fn course(
@@ -99,8 +94,7 @@ fn course(
     if valid < 100 || width == 0 {
         return (course, squares);
     }
-    // Coprime to the width, so that all columns are visited.
-    let stride = (stride..).find(|&stride| gcd(stride, width) == 1).unwrap_or(1);
+    let stride = coprime(stride, width);
     let there = |i: usize| field[i].is_finite().then(|| (i, i % width));
     let samples: Vec<(usize, usize)> = (0..field.len()).step_by(stride).filter_map(there).collect();
     let mut sizes: Vec<f32> = samples.iter().map(|&(i, _)| field[i].abs()).collect();

@@ -50,6 +50,16 @@ pub fn bisect([mut low, mut high]: [f64; 2], below: impl Fn(f64) -> bool) -> [f6
     [low, high]
 }
 
+/// Greatest common divisor.
+pub fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// The first stride from `stride` on that visits every column of pictures of this width.
+pub fn coprime(stride: usize, width: usize) -> usize {
+    (stride..).find(|&stride| gcd(stride, width) == 1).unwrap_or(1)
+}
+
 /// Mean of the finite values, if any.
 pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut sum, mut n) = (0.0, 0.0);
@@ -116,8 +126,11 @@ pub fn student_coverage(k: f64, degrees_of_freedom: Option<f64>) -> f64 {
     1.0 - 2.0 * beyond
 }
 
-/// P(T > t) of Student's t; 1 without degrees of freedom.
+/// P(T > t) of Student's t; 1 without degrees of freedom, or where t is not a number.
 pub fn student_upper(t: f64, degrees_of_freedom: f64) -> f64 {
+    if t.is_nan() {
+        return 1.0;
+    }
     StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.0, |law| law.sf(t))
 }
 

@@ -32,7 +32,6 @@ impl Baseline {
             // A window for part of the noise shows here alone.
             differ(&mut s.neighbour_correlation, twin.neighbour_correlation, 0.0);
             differ(&mut s.near_sum, twin.near_sum, 1.0);
-            s.near_error = s.near_error.hypot(twin.near_error);
             let profiles = s.correlation_profile.zip(twin.correlation_profile);
             s.correlation_profile = profiles.map(|(r, t)| std::array::from_fn(|k| r[k] - t[k]));
             differ(&mut s.still.fixed_px2, twin.still.fixed_px2, fixed);

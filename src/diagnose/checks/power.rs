@@ -16,11 +16,11 @@ use crate::diagnose::finding::scene::Scene;
 use crate::diagnose::options::POWER_80;
 use crate::diagnose::search::MIN_SHARE_OF_GAIN;
 use crate::diagnose::search::beside::Beside;
-use crate::diagnose::search::candidate::Candidate;
+use crate::diagnose::search::candidate::{Candidate, RECALIBRATE};
 use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::layer_null::Group;
 use crate::diagnose::search::null::Null;
-use crate::diagnose::search::outcome::Outcome;
+use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::search::prepared::evidence_of_bases;
 use crate::diagnose::search::rules::Rules;
 use crate::diagnose::search::variance::beyond_sigma;
@@ -50,8 +50,8 @@ impl DetectionCriteria<'_> {
         let views = evidence_of_bases(&self.left(), &bases);
         let alone = Beside::of(&views, m, self.rules.prior)?.alone(&views);
         let null = Null::of_candidate(&alone, self.rules.prior)?;
-        let first = self.outcome.chosen.first().map_or(0.0, |c| c.gain);
-        let rules = self.rules.beside(self.outcome.chosen.len());
+        let first = self.found().next().map_or(0.0, |c| c.gain);
+        let rules = self.rules.beside(self.found().count());
         let threshold = self.outcome.noise.threshold(Group::Named, rules.level);
         let need =
             null.gain_for(threshold, alone.len(), &self.rules).max(MIN_SHARE_OF_GAIN * first);
@@ -66,7 +66,7 @@ impl DetectionCriteria<'_> {
         let one = gain_of_one(&views, &u, self.rules.prior).filter(|gain| *gain > 0.0)?;
         let scatter = margin * information.sqrt();
         let by_gain = (scatter + (scatter * scatter + 4.0 * one * need).sqrt()) / (2.0 * one);
-        let largest = self.outcome.chosen.iter().map(|c| c.rms).fold(0.0, f64::max);
+        let largest = self.found().map(|c| c.rms).fold(0.0, f64::max);
         let weight: f64 = self.scene.data.iter().flat_map(|v| &v.weight).sum();
         // The size is that of the shape, whatever else is fitted beside it.
         let own = |v: &Evidence| u.dot(&(v.a.view((m, m), (u.len(), u.len())) * &u));
@@ -74,6 +74,12 @@ impl DetectionCriteria<'_> {
             * (weight / views.iter().map(own).sum::<f64>()).sqrt()
             + margin / information.sqrt();
         Some(by_gain.max(by_size)).filter(|size| *size > 0.0 && size.is_finite())
+    }
+
+    /// What the search chose; a refit of sigma, beside it, is no finding.
+    fn found(&self) -> impl Iterator<Item = &Chosen> {
+        let refit = |c: &Chosen| c.candidate.family == Some(RECALIBRATE) && self.beside.is_some();
+        self.outcome.chosen.iter().filter(move |c| !refit(c))
     }
 
     /// The views with the findings subtracted: these would not be taken for a further effect.

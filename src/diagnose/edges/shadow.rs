@@ -182,7 +182,8 @@ fn by_counts(views: &[EdgeLoss]) -> f64 {
         (v.counts[0][0] - expected).powi(2) / expected
     };
     let dispersion = views.iter().map(off).sum::<f64>() / freedom;
-    student_upper((deviance / dispersion.max(1.0)).sqrt(), freedom)
+    // Of equal shares it rounds to either side of zero.
+    student_upper((deviance.max(0.0) / dispersion.max(1.0)).sqrt(), freedom)
 }
 
 fn curve(views: &[EdgeLoss], share: f64) -> Curve {

@@ -15,10 +15,10 @@ pub fn words(basis: &Basis, beta: &[f64]) -> String {
         Basis::Map { .. } | Basis::Spline { .. } => {
             "a smooth pattern that stands still in the picture".into()
         }
-        Basis::Pair { over, .. } => {
-            let [a, b] = over.map(|o| o.axis().in_words());
-            format!("depends on the {a} and the {b} together")
-        }
+        Basis::Pair { over, .. } => match over.map(|o| o.axis().in_words()) {
+            [a, b] if a == b => format!("depends on the {a}"),
+            [a, b] => format!("depends on the {a} and the {b} together"),
+        },
         Basis::Curve { over, low, high, nodes, .. } => {
             if *nodes == 2 {
                 return format!("a step at {}", place(0.5 * (low + high), *over));
@@ -37,6 +37,7 @@ fn place(value: f64, over: Coordinate) -> String {
     let unit = match over {
         Coordinate::Column | Coordinate::Row | Coordinate::Edge | Coordinate::Disparity => " px",
         Coordinate::Z | Coordinate::Right | Coordinate::Down => " m",
+        Coordinate::LogZ => return digits(value.exp()) + " m",
         Coordinate::Theta | Coordinate::Azimuth => " rad",
         Coordinate::Session => " s",
         Coordinate::Radius => " of the corner's",

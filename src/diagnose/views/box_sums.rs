@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::stats::{MAD_TO_SIGMA, median_in_place, range};
+use crate::stats::{MAD_TO_SIGMA, coprime, median_in_place, range};
 
 /// Side of the box whose mean is subtracted, px: several matching windows, and less than a lens's bowl.
 pub const SMOOTH_PX: usize = 49;
@@ -89,8 +89,7 @@ pub fn take_out_cubic(values: &mut [f32], pixels: &[u32], width: usize) {
     };
     let limit = gross_limit(values);
     let (mut normal, mut cross) = (SMatrix::<f64, 10, 10>::zeros(), SVector::<f64, 10>::zeros());
-    // Odd, so that even and odd columns are sampled alike.
-    let stride = (pixels.len() / FITTED) | 1;
+    let stride = coprime((pixels.len() / FITTED).max(1), width);
     for (&i, r) in pixels.iter().zip(&*values).step_by(stride) {
         if r.abs() <= limit {
             let columns = columns(i);
