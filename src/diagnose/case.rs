@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::against::Baseline;
 use super::diagnosis::Finding;
-use super::finding::pixels::{mean_of, pixel_terms, take_out, terms_of};
+use super::finding::pixels::{mean_of, pixel_terms, subtract_terms, terms_of};
 use super::missing::DropoutOutcome;
 use super::noise::lines::LearntLines;
 use super::noise::still::{KeptPattern, beside_bias, still};
@@ -101,10 +101,10 @@ impl<'a> Case<'a> {
             survey((fields, &kept, lattice), &bench, baseline.as_ref(), options, learnt, model)
         };
         let mut survey = surveyed(&fields);
-        // Two recordings are compared in the same units of sigma, whatever light fell on them.
-        let [bias, variance] = known.over_light();
+        // Beside a simulation both recordings keep the same sigma, so that only their difference counts.
+        let [bias, variance] = known.light_terms();
         if baseline.is_none() && !(bias.is_empty() && variance.is_empty()) {
-            take_out(&mut fields, [&bias, &variance], &survey, &bench);
+            subtract_terms(&mut fields, [&bias, &variance], &survey, &bench);
             // Two surveys at once are a quarter of all memory.
             drop(survey);
             survey = surveyed(&fields);

@@ -42,8 +42,8 @@ impl Effect for IntensityDependentNoise {
         seen.map(|(orders, level)| dark(orders, level)).collect()
     }
 
-    /// Brighter surfaces are less noisy, from the median light to twice as much. Where they are noisier, the room
-    /// shines on them.
+    /// The noise falls with the light, from its median to twice that: the greys of a print reach as far. Where it
+    /// rises, the room shines on the target.
     fn agrees_with(&self, _: Option<&Flat>, _: &Basis, coefficients: &[f64]) -> bool {
         let bend = coefficients.get(BEND).copied().unwrap_or(0.0);
         let slope = |light: f64| coefficients[0] + 2.0 * bend * light.ln();

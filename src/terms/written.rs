@@ -17,10 +17,10 @@ pub(super) struct Written {
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "a shape of a known kind, with all its numbers")]
+#[serde(untagged, expecting = "unknown kind of shape, or a number of it is missing or wrong")]
 enum Shape {
     Older(Kind),
-    Own(Basis),
+    Basis(Basis),
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
@@ -44,7 +44,7 @@ enum Kind {
 
 impl From<Term> for Written {
     fn from(Term { statistic, basis, coefficients }: Term) -> Self {
-        let basis = Kind::of(&basis, statistic).map_or(Shape::Own(basis), Shape::Older);
+        let basis = Kind::of(&basis, statistic).map_or(Shape::Basis(basis), Shape::Older);
         Written { statistic, basis, coefficients }
     }
 }
@@ -53,7 +53,7 @@ impl From<Written> for Term {
     fn from(Written { statistic, basis, coefficients }: Written) -> Self {
         let basis = match basis {
             Shape::Older(kind) => kind.into(),
-            Shape::Own(basis) => basis,
+            Shape::Basis(basis) => basis,
         };
         Term { statistic, basis, coefficients }
     }

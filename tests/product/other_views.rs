@@ -5,6 +5,7 @@ use kinoise::diagnose::{DiagnoseOptions, Finding, Verdict, diagnose};
 use kinoise::effects::Active;
 use kinoise::scene::{PATCH_SIDE_M, Print, Target, WHITE};
 use kinoise::simulate::{Grid, Physics, Scenery, Shoot, kinect_v1, plan_grid};
+use kinoise::terms::Axis;
 use kinoise::{
     CalibrateOptions, NoiseModel, Recording, Seed, SigmaModel, io, measure_recording, model_of,
 };
@@ -107,6 +108,7 @@ fn noise_that_follows_the_print_is_known_again() {
     }
     let changed = judge(&first.model, &[], 5).diagnosis;
     assert_eq!(changed.verdict, Verdict::Mismatch);
+    assert_eq!(changed.findings[0].axis, Axis::Intensity);
 }
 
 /// Against a model whose sigma is too large, only sigma is off: views are weighted relative to it, and after

@@ -217,7 +217,7 @@ impl LightLine {
         let mean = |at: f64, height: f64| {
             let variance =
                 covariance[(0, 0)] + at * (at * covariance[(1, 1)] - 2.0 * covariance[(0, 1)]);
-            ViewMean::new(height, variance.max(0.0).sqrt(), n as f64 - 1.0)
+            ViewMean::new(height, variance.sqrt(), n as f64 - 1.0)
         };
         Some(LightLine {
             lift: mean(0.0, line[0] - darkest),

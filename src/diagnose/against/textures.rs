@@ -43,7 +43,8 @@ impl Baseline {
             let frames = s.frame_log_variance.iter_mut().zip(twin.frame_log_variance);
             lines.chain(frames).for_each(|(real, twin)| differ(real, twin, 0.0));
             for (k, lag) in lags.iter().enumerate() {
-                if twin.lagged[k].is_some() {
+                // Of frames that the twin has; where rounding hides its correlation, nothing is known.
+                if twin.stored[k].is_some() {
                     differ(&mut s.lagged[k], twin.lagged[k], *lag);
                 }
             }

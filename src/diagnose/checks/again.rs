@@ -5,7 +5,7 @@
 use crate::diagnose::battery::Battery;
 use crate::diagnose::case::Case;
 use crate::diagnose::diagnosis::{After, Finding, Remaining};
-use crate::diagnose::finding::pixels::take_out;
+use crate::diagnose::finding::pixels::subtract_terms;
 use crate::diagnose::verdict::verdict;
 use crate::diagnose::views::known::KnownTerms;
 use crate::model::{Effect, NoiseModel};
@@ -21,7 +21,7 @@ impl<'a> Case<'a> {
         let added = self.added(extended);
         let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
         let mut fields = std::mem::take(&mut self.fields);
-        take_out(&mut fields, [&added.bias, &added.variance], &self.survey, &self.bench);
+        subtract_terms(&mut fields, [&added.bias, &added.variance], &self.survey, &self.bench);
         let mut case = self.again(fields, extended);
         let battery = case.battery();
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);

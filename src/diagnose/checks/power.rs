@@ -76,7 +76,7 @@ impl DetectionCriteria<'_> {
         Some(by_gain.max(by_size)).filter(|size| *size > 0.0 && size.is_finite())
     }
 
-    /// What the search chose; a refit of sigma, beside it, is no finding.
+    /// Terms that the search chose, without the refit of sigma that was fitted beside them.
     fn found(&self) -> impl Iterator<Item = &Chosen> {
         let refit = |c: &Chosen| c.candidate.family == Some(RECALIBRATE) && self.beside.is_some();
         self.outcome.chosen.iter().filter(move |c| !refit(c))

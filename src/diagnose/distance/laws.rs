@@ -20,7 +20,7 @@ pub struct Law {
     /// RMS change of the depth, m and in sigmas.
     pub rms_m: f64,
     pub rms_sigma: f64,
-    /// RMS of the part of it that the nuisances beside it cannot imitate, m and in errors of a reference.
+    /// RMS of the part of it that no open constant imitates, m and in errors of a reference.
     pub beyond_m: f64,
     pub beyond_errors: f64,
     /// Parameters that determine its shape, each with its standard error.
@@ -46,6 +46,8 @@ struct References<'a> {
     checked: &'a [ReferencedView],
     /// Shift of each view by one unit of each nuisance, m.
     others: Vec<Vec<f64>>,
+    /// Number of the last of these that are open constants of biases.
+    open: usize,
     scatter: Scatter,
 }
 
@@ -58,7 +60,8 @@ impl<'a> References<'a> {
             angles.chain(bent).chain(open.iter().map(|f| f.moves_m(c))).collect()
         };
         let scatter = Scatter::of(checked);
-        References { checked, others: checked.iter().map(others).collect(), scatter }
+        let others = checked.iter().map(others).collect();
+        References { checked, others, open: open.len(), scatter }
     }
 
     /// Evidence on the nuisances, and on a law that moves the views so far.
@@ -75,14 +78,18 @@ impl<'a> References<'a> {
         self.checked.iter().enumerate().map(of).collect()
     }
 
-    /// What the nuisances, by their fit with their prior, leave of a law's `moves`; `views` is the evidence on both.
-    fn beyond_nuisances(&self, views: &[Evidence], moves: &[f64]) -> Option<Vec<f64>> {
+    /// What the open constants, fitted to a law's `moves` with their prior, leave of them; `views` is the
+    /// evidence on all nuisances and the law.
+    fn beyond_constants(&self, views: &[Evidence], moves: &[f64]) -> Option<Vec<f64>> {
         let beside = self.others.first().map_or(0, Vec::len);
+        let first = beside - self.open;
         let all = Evidence::sum(beside + 1, PRIOR, views).a;
-        let own = all.view((0, 0), (beside, beside)).into_owned();
-        let like = Cholesky::of(own)?.solve(&all.view((0, beside), (beside, 1)).column(0).into());
+        let own = all.view((first, first), (self.open, self.open)).into_owned();
+        let with_law = all.view((first, beside), (self.open, 1)).column(0).into_owned();
+        let imitation = Cholesky::of(own)?.solve(&with_law);
         let left = |(moves, others): (&f64, &Vec<f64>)| {
-            moves - others.iter().zip(like.iter()).map(|(o, l)| o * l).sum::<f64>()
+            let of = others[first..].iter().zip(imitation.iter());
+            moves - of.map(|(constant, size)| constant * size).sum::<f64>()
         };
         Some(moves.iter().zip(&self.others).map(left).collect())
     }
@@ -98,7 +105,7 @@ impl<'a> References<'a> {
         let beside = self.others.first().map_or(0, Vec::len);
         let views = self.evidence(Some(&moves));
         let moves: Vec<f64> = checked.iter().map(moves).collect();
-        let beyond = self.beyond_nuisances(&views, &moves)?;
+        let beyond = self.beyond_constants(&views, &moves)?;
         let mut gain = gain(&views, PRIOR)?;
         if beside > 0 {
             gain.total -= self::gain(&self.evidence(None), PRIOR).map_or(0.0, |alone| alone.total);

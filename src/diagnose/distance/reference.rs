@@ -17,8 +17,7 @@ use crate::diagnose::views::learnt::Learnt;
 use crate::effects;
 use crate::rng::Seed;
 use crate::sensors::SensorKind;
-use crate::stats::mean;
-use crate::terms::{Axis, PixelContext, Statistic, Term};
+use crate::terms::{Axis, Statistic, Term};
 
 /// Least effect of a law on the depth that no constant of a bias imitates, in errors of a reference; `MIN_M` is
 /// the same in m. Tapes and planes are not better.
@@ -27,12 +26,10 @@ const MIN_M: f64 = 0.0015;
 /// Names that predict within this many nats of the best cannot be told apart.
 const AS_GOOD_NATS: f64 = 3.0;
 
-/// Distance between a bent target's plane and the place on it that was measured, by the RMS of its relief. The
-/// mean of a parabola is 1.1 times its RMS from the vertex, and 2.2 times from the rim.
-const FROM_PLACE: f64 = 2.0;
-
-/// That distance, m, of the reliefs found.
+/// Distance between a bent target's plane and the place on it that was measured, m. The mean of a parabola is
+/// 1.1 times its RMS from the vertex, and 2.2 times from the rim.
 pub fn bent_m(found: &[Finding]) -> f64 {
+    const FROM_PLACE: f64 = 2.0;
     let bent = |f: &&Finding| f.statistic == Statistic::Bias && f.axis == Axis::TargetPosition;
     1e-3 * FROM_PLACE * found.iter().filter(bent).map(|f| f.size.mm).fold(0.0, f64::hypot)
 }
@@ -140,15 +137,6 @@ pub fn can_happen(id: &str, kind: Option<SensorKind>) -> bool {
 }
 
 impl Case<'_> {
-    /// RMS of the relief that the model has for the target, m.
-    fn known_relief_m(&self) -> f64 {
-        let is_relief = |t: &&Term| t.basis.axis() == Axis::TargetPosition;
-        let relief: Vec<Term> = self.known.bias.iter().filter(is_relief).cloned().collect();
-        let places = self.survey.views.iter().flat_map(|v| v.places.iter());
-        let square = |p: &PixelContext| (Term::sum(&relief, p) * p.z / p.disparity).powi(2);
-        if relief.is_empty() { 0.0 } else { mean(places.map(square)).unwrap_or(0.0).sqrt() }
-    }
-
     /// Finds laws of distance error by the reference distances.
     pub(in crate::diagnose) fn laws(&self, bias: &[Term], bent_m: f64) -> Vec<Finding> {
         let ours = references(&self.fields);
@@ -162,7 +150,6 @@ impl Case<'_> {
         let of_catalogue = |t: &&Term| t.basis.is_nothing_ahead() || t.basis.is_bowl();
         let plain: Vec<Term> = bias.iter().filter(of_catalogue).cloned().collect();
         let views = self.fields.len() as f64;
-        let bent_m = bent_m.hypot(FROM_PLACE * self.known_relief_m());
         // The levels carry the error of the model's bias, and its own references, if any, leave a law
         // uncertain.
         let of_bias = self.survey.learnt_from[0].map(|l| l.of_difference(views));

@@ -182,7 +182,7 @@ fn by_counts(views: &[EdgeLoss]) -> f64 {
         (v.counts[0][0] - expected).powi(2) / expected
     };
     let dispersion = views.iter().map(off).sum::<f64>() / freedom;
-    // Of equal shares it rounds to either side of zero.
+    // The deviance of equal shares is zero but for rounding.
     student_upper((deviance.max(0.0) / dispersion.max(1.0)).sqrt(), freedom)
 }
 

@@ -31,8 +31,11 @@ pub(in crate::diagnose) fn common(
     if !told {
         return [0.0; 3];
     }
-    let at = |lag: usize| mean_of(structure.iter().filter_map(|s| s.lagged_beside_rounding()[lag]));
-    let is_measured = |lag: usize| structure.iter().any(|s| s.lagged[lag].is_some());
+    // The variance between frames lacks what rounding alone makes them share, noise or not.
+    let beyond =
+        |lag: usize| structure.iter().filter_map(move |s| Some(s.stored[lag]? - s.rounded));
+    let at = |lag: usize| mean_of(beyond(lag));
+    let is_measured = |lag: usize| structure.iter().any(|s| s.stored[lag].is_some());
     let second = if is_measured(1) { at(1) } else { at(0) };
     [at(0), second, if is_measured(2) { at(2) } else { at(1) }]
 }
@@ -84,7 +87,7 @@ pub(in crate::diagnose) fn measure_tails(
         let factor = |k: usize| factors.get(n).map_or(1.0, |f| (0.5 * f[k]).exp());
         let sigma_px: Vec<f32> = (0..told.len()).map(|k| field.sigma[k] * factor(k)).collect();
         // Single frames, unless their constant part could be taken for a tail.
-        let apart = s.alike.is_some_and(|c| c < HARDLY_STILL);
+        let apart = s.stored[0].is_some_and(|c| c < HARDLY_STILL);
         let whitened = |frame: &Vec<f32>| {
             let white = |k: usize| {
                 let error = frame[k] - bias.get(n).map_or(0.0, |b| b[k]);
@@ -94,7 +97,7 @@ pub(in crate::diagnose) fn measure_tails(
         };
         let mut looks: Vec<Vec<f32>> = field.first.iter().map(whitened).collect();
         if !apart && !looks.is_empty() {
-            looks = vec![moving(&looks, s.alike)];
+            looks = vec![moving(&looks, s.stored[0])];
         }
         (s.tails, s.moments) = (TailCounts::default(), Moments::default());
         let mut far = vec![false; looks.first().map_or(0, Vec::len)];
@@ -171,8 +174,8 @@ impl Still {
     }
 }
 
-/// Subtracts the `bias` from the residuals, and multiplies sigma by what the `variance` terms make of it.
-pub(in crate::diagnose) fn take_out(
+/// Subtracts the `bias` terms from the residuals, and scales sigma by the `variance` terms.
+pub(in crate::diagnose) fn subtract_terms(
     fields: &mut [Field],
     [bias, variance]: [&[Term]; 2],
     survey: &Survey,
@@ -180,7 +183,7 @@ pub(in crate::diagnose) fn take_out(
 ) {
     let [bias, spread] = [bias, variance].map(|terms| pixel_terms(fields, terms, survey, bench));
     for (n, field) in fields.iter_mut().enumerate() {
-        bias.get(n).into_iter().for_each(|b| shift(field, b));
+        bias.get(n).into_iter().for_each(|b| subtract_bias(field, b));
         for (sigma, log) in field.sigma.iter_mut().zip(spread.get(n).into_iter().flatten()) {
             *sigma *= (0.5 * log).exp();
         }
@@ -189,7 +192,7 @@ pub(in crate::diagnose) fn take_out(
 
 /// Subtracts `bias` (px by pixel) from the residuals. Means of whole frames are only compared with one
 /// another, and keep what all frames share.
-fn shift(field: &mut Field, bias: &[f32]) {
+fn subtract_bias(field: &mut Field, bias: &[f32]) {
     let both = field.mean.iter_mut().zip(&mut field.square);
     for ((mean, square), b) in both.zip(bias) {
         *square += b * (b - 2.0 * *mean);

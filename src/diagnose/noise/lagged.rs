@@ -40,11 +40,6 @@ impl Structure {
         self.lagged.map(|c| Some((c? - share) / left))
     }
 
-    /// Same with the error of rounding in the variance, though not in the covariance.
-    pub fn lagged_beside_rounding(&self) -> [Option<f64>; 3] {
-        self.lagged.map(|c| Some(c? * (1.0 - self.rounding)))
-    }
-
     /// Share of a pattern in the variance, and the rest.
     fn pattern_share(&self, pattern_px2: f64) -> (f64, f64) {
         let share = (pattern_px2.max(0.0) / self.noise_px2().max(1e-12)).min(LARGEST_PATTERN);

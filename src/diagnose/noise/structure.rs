@@ -12,7 +12,7 @@ use super::texture::{
     frame_log_variance, moving, same_pixel, without_lines,
 };
 use crate::diagnose::options::FRAMES_KEPT;
-use crate::diagnose::steps::rounding::{before_rounding, share_of_rounding};
+use crate::diagnose::steps::rounding::{before_rounding, share_of_rounding, still_share};
 use crate::diagnose::views::box_sums::repeats_of_box;
 use crate::diagnose::views::field::Field;
 use crate::stats::{Correlation, LONGEST_LAG, mean, mean_square};
@@ -42,8 +42,10 @@ pub struct Structure {
     pub near_sum: Option<f64>,
     /// Correlation of a pixel with itself 1, 2 and 3 frames later, before rounding.
     pub lagged: [Option<f64>; 3],
-    /// Same of successive frames, of the stored words.
-    pub alike: Option<f64>,
+    /// Same of the stored words.
+    pub stored: [Option<f64>; 3],
+    /// Correlation that rounding alone gives the frames' words.
+    pub rounded: f64,
     /// Log ratio of each of the first frames' variance to that of the others.
     pub frame_log_variance: [Option<f64>; FRAMES_KEPT],
     /// Number of pixels that all of these frames measured.
@@ -181,13 +183,12 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     let left_px2 = mean_square(&level[0]).unwrap_or(0.0);
     s.lines_px2 = (s.variance_px2 - left_px2).max(0.0);
     s.rounding = share_of_rounding(s.step_px, left_px2);
-    let stored = |lag: usize| {
+    s.stored = [1, 2, 3].map(|lag| {
         let pairs = 0..frames.len().saturating_sub(lag);
         mean(pairs.map(|k| same_pixel(&level[k], &level[k + lag])))
-    };
-    s.alike = stored(1);
-    s.lagged =
-        [1, 2, 3].map(|lag| stored(lag).and_then(|rho| before_rounding(rho, s.step_px, left_px2)));
+    });
+    s.lagged = s.stored.map(|rho| before_rounding(rho?, s.step_px, left_px2));
+    s.rounded = still_share(s.step_px, left_px2);
     (s.frame_log_variance, s.frame_pixels) = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| cut.image(r)).collect();
     let pairs: Option<Vec<Pairs>> =
@@ -215,7 +216,7 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
     }
     let share = |px2: Option<f64>| (px2.unwrap_or(0.0) / s.variance_px2.max(1e-12)).max(0.0);
     let shares = [share(s.row_px2), share(s.column_px2)];
-    let window = area(&moving(&frames, s.alike), cut.width, shares);
+    let window = area(&moving(&frames, s.stored[0]), cut.width, shares);
     s.window_px = Some(window.sqrt());
     // A window for only part of the noise is too weak to see lag by lag.
     let of_mean_px2 = frame_mean_px2(field, &s, window.max(s.near_sum.unwrap_or(1.0)));
@@ -228,7 +229,7 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
 
 /// Variance of a frame's mean due to the noise of its pixels and rows, px^2.
 fn frame_mean_px2(field: &Field, s: &Structure, correlation_sum: f64) -> f64 {
-    let still = s.alike.unwrap_or(0.0).clamp(0.0, 1.0);
+    let still = s.stored[0].unwrap_or(0.0).clamp(0.0, 1.0);
     let own = s.variance_px2 * (1.0 - still) * correlation_sum / field.measured_pixels().max(1.0);
     own + s.row_px2.unwrap_or(0.0).max(0.0) / rows(field)
 }

@@ -187,6 +187,7 @@ impl<'a> Layer<'a> {
     fn trial(&self, chosen: &[Chosen]) -> Option<Trial<'_>> {
         let beside: Vec<Chosen> = self.pinned.iter().chain(chosen).cloned().collect();
         let views = self.prepare(&beside);
+        views.first()?;
         let settled = bases_where(&beside, |c| c.family.is_some()).iter().map(|b| b.count()).sum();
         let Layer { rules, largest, .. } = *self;
         let weight = self.together.coarse.iter().flat_map(|v| &v.weight).sum();

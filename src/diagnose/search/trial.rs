@@ -110,7 +110,8 @@ impl Trial<'_> {
         open().filter_map(judged).collect()
     }
 
-    /// Judges a candidate by the views' evidence on it and the terms alongside, which gained so much `before`.
+    /// Judges a candidate by the views' evidence on it and the terms alongside. `before` is the gain of these terms
+    /// without it.
     fn judged_by(
         &self,
         c: &Candidate,

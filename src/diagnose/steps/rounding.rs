@@ -110,7 +110,7 @@ pub fn before_rounding(stored: f64, step_px: f64, variance: f64) -> Option<f64> 
 }
 
 /// Share of the noise variance (px^2) that all frames have in common where they are rounded to this step.
-fn still_share(step_px: f64, variance: f64) -> f64 {
+pub fn still_share(step_px: f64, variance: f64) -> f64 {
     if step_px <= 0.0 {
         return 0.0;
     }

@@ -72,12 +72,13 @@ impl Field {
         self.pixels.iter().map(of).collect()
     }
 
-    /// Disparity that the model expects at each pixel, px. Its variance terms scale `sigma`.
+    /// Disparity that the model expects at each pixel, px. Its variance terms scale `sigma`. Terms over the light
+    /// are left to [`KnownTerms::light_terms`].
     fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>) -> Vec<f32> {
         let n = self.pixels.len();
         let mut expected: Vec<f32> =
             (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
-        let [bias, variance] = known.by_place();
+        let [bias, variance] = known.other_terms();
         if bias.is_empty() && variance.is_empty() {
             return expected;
         }

@@ -41,13 +41,13 @@ impl KnownTerms {
         known
     }
 
-    /// Those of the bias and of the variance that follow the light, which is known once all views are read.
-    pub fn over_light(&self) -> [Vec<Term>; 2] {
+    /// Terms of the bias and of the variance over the light, which is known once all views are read.
+    pub fn light_terms(&self) -> [Vec<Term>; 2] {
         self.by_light(true)
     }
 
-    /// The others.
-    pub fn by_place(&self) -> [Vec<Term>; 2] {
+    /// Terms of the bias and of the variance over anything else.
+    pub fn other_terms(&self) -> [Vec<Term>; 2] {
         self.by_light(false)
     }
 

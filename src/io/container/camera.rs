@@ -57,10 +57,12 @@ fn beside(topics: &[Topic], depth: &str) -> Option<usize> {
         _ => namespace,
     };
     let is_there = |t: &Topic| {
-        let inside = t.name.strip_prefix(namespace).is_some_and(|rest| {
-            // Every topic lies in the root's namespace: only those directly below it belong to the images.
-            rest.starts_with('/') && !(namespace.is_empty() && rest[1..].contains('/'))
-        });
+        let below = |parent: &str| t.name.strip_prefix(parent).and_then(|r| r.strip_prefix('/'));
+        // Every topic lies in the root's namespace: there only its own belong to the images.
+        let inside = match namespace {
+            "" => below("").is_some_and(|rest| !rest.contains('/')) || below(depth).is_some(),
+            _ => below(namespace).is_some(),
+        };
         inside && t.kind == "sensor_msgs/CameraInfo" && !t.logged_ns.is_empty()
     };
     let mut found = topics.iter().enumerate().filter(|(_, t)| is_there(t));

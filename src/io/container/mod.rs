@@ -92,7 +92,7 @@ impl Kind {
 const METADATA: &str = "metadata.yaml";
 
 pub(super) fn is_one(path: &Path) -> bool {
-    let described = || DESCRIPTIONS.iter().any(|name| path.join(name).exists());
+    let described = || DESCRIPTIONS.iter().any(|name| path.join(name).is_file());
     Kind::of(path).is_some() || path.join(METADATA).is_file() && !described()
 }
 

@@ -109,7 +109,7 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
         |name: &str| BESIDE.contains(&name) || assumed.topic.as_deref().is_some_and(|t| t == name);
     let members = members(path)?;
     let (mut arrays, mut unread) = (Vec::new(), None);
-    // Where the depth is named, nothing else need be readable.
+    // Where the depth is named, only it and what is read beside it must be readable.
     for member in members.iter().filter(|m| assumed.topic.is_none() || is_used(&m.name)) {
         match Array::open(path, Some(member))? {
             Ok(array) => arrays.push(array),
