@@ -2,7 +2,9 @@
 //! holds is written as it is.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
 
 use super::basis::Basis;
 use super::coordinate::Coordinate;
@@ -16,11 +18,25 @@ pub(super) struct Written {
     coefficients: Vec<f64>,
 }
 
-#[derive(Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "unknown kind of shape, or a number of it is missing or wrong")]
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
 enum Shape {
     Older(Kind),
     Basis(Basis),
+}
+
+/// By its kind: an untagged enum would not say which kind is unknown, or what it lacks.
+impl<'de> Deserialize<'de> for Shape {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        match Kind::deserialize(&value) {
+            Err(e) if e.to_string().starts_with("unknown variant") => {
+                Basis::deserialize(&value).map(Shape::Basis)
+            }
+            kind => kind.map(Shape::Older),
+        }
+        .map_err(D::Error::custom)
+    }
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
@@ -143,7 +159,7 @@ impl From<Kind> for Basis {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::{Value, json};
+    use serde_json::json;
 
     use super::*;
 
