@@ -96,19 +96,15 @@ impl<'a> Case<'a> {
         progress.stage("comparing with the model");
         let lattice = measure_steps(&mut fields, recording, &bench.rays);
         let kept = KeptPattern::of(&fields);
-        let learnt = (learnt_from(model, &known, options, simulated.is_some()), &known);
-        let surveyed = |fields: &[Field]| {
-            survey((fields, &kept, lattice), &bench, baseline.as_ref(), options, learnt, model)
-        };
-        let mut survey = surveyed(&fields);
-        // Beside a simulation both recordings keep the same sigma, so that only their difference counts.
         let [bias, variance] = known.light_terms();
+        // Beside a simulation both recordings keep the same sigma, so that only their difference counts.
         if baseline.is_none() && !(bias.is_empty() && variance.is_empty()) {
-            subtract_terms(&mut fields, [&bias, &variance], &survey, &bench);
-            // Two surveys at once are a quarter of all memory.
-            drop(survey);
-            survey = surveyed(&fields);
+            let light = Survey::of(&fields, &bench, lattice).light;
+            subtract_terms(&mut fields, [&bias, &variance], light, &bench);
         }
+        let learnt = (learnt_from(model, &known, options, simulated.is_some()), &known);
+        let survey =
+            survey((&fields, &kept, lattice), &bench, baseline.as_ref(), options, learnt, model);
         Ok(Case {
             recording,
             model,
@@ -212,7 +208,7 @@ impl<'a> Case<'a> {
     /// Terms of the mean, and their sum at every pixel, px.
     fn everywhere(&self, outcome: &Outcome) -> (Vec<Term>, Vec<Vec<f32>>) {
         let terms = terms_of(outcome, Statistic::Bias);
-        let px = pixel_terms(&self.fields, &terms, &self.survey, &self.bench);
+        let px = pixel_terms(&self.fields, &terms, self.survey.light, &self.bench);
         (terms, px)
     }
 

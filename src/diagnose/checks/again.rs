@@ -21,7 +21,7 @@ impl<'a> Case<'a> {
         let added = self.added(extended);
         let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
         let mut fields = std::mem::take(&mut self.fields);
-        subtract_terms(&mut fields, [&added.bias, &added.variance], &self.survey, &self.bench);
+        subtract_terms(&mut fields, [&added.bias, &added.variance], self.survey.light, &self.bench);
         let mut case = self.again(fields, extended);
         let battery = case.battery();
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);

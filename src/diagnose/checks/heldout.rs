@@ -102,7 +102,7 @@ impl Case<'_> {
         if lines.is_empty() {
             return vec![LinesGain::default(); aside.len()];
         }
-        let at_pixels = |terms| pixel_terms(&self.fields, terms, &self.survey, &self.bench);
+        let at_pixels = |terms| pixel_terms(&self.fields, terms, self.survey.light, &self.bench);
         let bias = at_pixels(bias);
         let all = beside_bias(&self.fields, &bias);
         let learnt_on: Vec<(&Field, &[f32])> = rest.iter().map(|&v| all[v]).collect();

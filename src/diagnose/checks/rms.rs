@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::diagnose::views::tiles::Tile;
-use crate::solve::plane_through;
 use crate::terms::{PixelContext, Term};
 
 /// RMS over every pixel of every frame, px, with the sum of squares reduced by `less_px2` for the lines; and
@@ -37,8 +36,7 @@ fn values(view: &SurveyedView, terms: &[Term]) -> Vec<f64> {
 
 /// Plane left in a view's means without these values.
 fn plane_left(view: &SurveyedView, values: &[f64]) -> Option<Vector3<f64>> {
-    let points = view.patches().zip(values);
-    plane_through(points.map(|((p, t), f)| ([p.x, p.y], t.mean - f, t.pixels)))
+    view.plane_through(view.tiles.iter().zip(values).map(|(t, f)| t.mean - f))
 }
 
 /// Visits every patch that has a mean, with the terms' value there, the plane fitted anew.

@@ -12,6 +12,7 @@ use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::known_error::is_beyond;
 use crate::diagnose::views::layers::Survey;
+use crate::diagnose::views::light::Light;
 use crate::diagnose::views::tiles::{Places, rim_px};
 use crate::measure::Workbench;
 use crate::model::SigmaModel;
@@ -32,12 +33,10 @@ pub(in crate::diagnose) fn common(
         return [0.0; 3];
     }
     // The variance between frames lacks what rounding alone makes them share, noise or not.
-    let beyond =
-        |lag: usize| structure.iter().filter_map(move |s| Some(s.stored[lag]? - s.rounded));
-    let at = |lag: usize| mean_of(beyond(lag));
-    let is_measured = |lag: usize| structure.iter().any(|s| s.stored[lag].is_some());
-    let second = if is_measured(1) { at(1) } else { at(0) };
-    [at(0), second, if is_measured(2) { at(2) } else { at(1) }]
+    let at = |lag: usize| mean(structure.iter().filter_map(|s| Some(s.stored[lag]? - s.rounded)));
+    let first = at(0).unwrap_or(0.0);
+    let second = at(1).unwrap_or(first);
+    [first, second, at(2).unwrap_or(second)]
 }
 
 /// Variance of the pixels' constant errors, px^2.
@@ -72,7 +71,7 @@ pub(in crate::diagnose) fn measure_tails(
     bias: &[Vec<f32>],
     Whitener { sigma, terms, survey, bench }: &Whitener<'_>,
 ) {
-    let factors = pixel_terms(fields, terms, survey, bench);
+    let factors = pixel_terms(fields, terms, survey.light, bench);
     structure.par_iter_mut().zip(fields).enumerate().for_each(|(n, (s, field))| {
         // Places where the model says nothing of the noise are excluded, and pixels that may also see what is
         // behind the target.
@@ -178,10 +177,10 @@ impl Still {
 pub(in crate::diagnose) fn subtract_terms(
     fields: &mut [Field],
     [bias, variance]: [&[Term]; 2],
-    survey: &Survey,
+    light: Light,
     bench: &Workbench<'_>,
 ) {
-    let [bias, spread] = [bias, variance].map(|terms| pixel_terms(fields, terms, survey, bench));
+    let [bias, spread] = [bias, variance].map(|terms| pixel_terms(fields, terms, light, bench));
     for (n, field) in fields.iter_mut().enumerate() {
         bias.get(n).into_iter().for_each(|b| subtract_bias(field, b));
         for (sigma, log) in field.sigma.iter_mut().zip(spread.get(n).into_iter().flatten()) {
@@ -207,7 +206,7 @@ fn subtract_bias(field: &mut Field, bias: &[f32]) {
 pub(in crate::diagnose) fn pixel_terms(
     fields: &[Field],
     terms: &[Term],
-    survey: &Survey,
+    light: Light,
     bench: &Workbench<'_>,
 ) -> Vec<Vec<f32>> {
     if terms.is_empty() {
@@ -226,7 +225,7 @@ pub(in crate::diagnose) fn pixel_terms(
                     let mut sum: f64 = still.iter().map(at).sum();
                     if let Some(places) = &places {
                         let mut place = places.pixel(k);
-                        place.light = survey.light.of(f, k, &place);
+                        place.light = light.of(f, k, &place);
                         sum += Term::sum(&others, &place);
                     }
                     sum as f32

@@ -161,7 +161,7 @@ impl Case<'_> {
             axes.iter().filter_map(|axis| LearntLines::of(&views, *axis)).collect();
         let all: Vec<Term> =
             terms.iter().chain(lines.iter().map(|l| &l.profile)).cloned().collect();
-        let px = pixel_terms(&self.fields, &all, &self.survey, &self.bench);
+        let px = pixel_terms(&self.fields, &all, self.survey.light, &self.bench);
         (lines, px)
     }
 

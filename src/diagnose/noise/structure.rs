@@ -12,7 +12,9 @@ use super::texture::{
     frame_log_variance, moving, same_pixel, without_lines,
 };
 use crate::diagnose::options::FRAMES_KEPT;
-use crate::diagnose::steps::rounding::{before_rounding, share_of_rounding, still_share};
+use crate::diagnose::steps::rounding::{
+    before_rounding, correlation_of_rounding, share_of_rounding,
+};
 use crate::diagnose::views::box_sums::repeats_of_box;
 use crate::diagnose::views::field::Field;
 use crate::stats::{Correlation, LONGEST_LAG, mean, mean_square};
@@ -188,7 +190,7 @@ pub fn structure(field: &Field, bias: &[f32]) -> (Structure, Lines) {
         mean(pairs.map(|k| same_pixel(&level[k], &level[k + lag])))
     });
     s.lagged = s.stored.map(|rho| before_rounding(rho?, s.step_px, left_px2));
-    s.rounded = still_share(s.step_px, left_px2);
+    s.rounded = correlation_of_rounding(s.step_px, left_px2);
     (s.frame_log_variance, s.frame_pixels) = frame_log_variance(&frames);
     let images: Vec<Vec<f32>> = field.first.iter().map(|r| cut.image(r)).collect();
     let pairs: Option<Vec<Pairs>> =

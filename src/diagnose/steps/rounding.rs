@@ -59,7 +59,8 @@ impl Rounding {
         let q = v / (1.0 + (1.0 - v * v).sqrt());
         let first = [sin, cos].map(|phase| 2.0 * q / v * phase);
         // The square of the mean's wave, which the variance lacks, has twice its frequency.
-        let still = |i: usize| still_share(self.step_px(&places[i]), places[i].variance);
+        let still =
+            |i: usize| correlation_of_rounding(self.step_px(&places[i]), places[i].variance);
         let beside = |phase: usize| mean(&|i| still(i) * self.phases(2.0, &places[i])[phase]);
         let twice = [2.0 * sin * cos, cos * cos - sin * sin].map(|phase| (q / v).powi(2) * phase);
         let lost = if between_frames { mean(&still) } else { 0.0 };
@@ -105,23 +106,23 @@ pub fn before_rounding(stored: f64, step_px: f64, variance: f64) -> Option<f64> 
         return Some(stored);
     }
     let r2 = noise(step_px, variance);
-    let words = |rho: f64| (r2 * rho + rounded_alike(r2 * (1.0 - rho))) / (r2 + 1.0 / 12.0);
-    (r2 > 1.0 / 12.0).then(|| bisect([-1.0, 1.0], |rho| words(rho) < stored)[0])
+    (r2 > 1.0 / 12.0).then(|| bisect([-1.0, 1.0], |rho| of_words(rho, r2) < stored)[0])
 }
 
 /// Share of the noise variance (px^2) that all frames have in common where they are rounded to this step.
-pub fn still_share(step_px: f64, variance: f64) -> f64 {
+pub fn correlation_of_rounding(step_px: f64, variance: f64) -> f64 {
     if step_px <= 0.0 {
         return 0.0;
     }
-    let r2 = noise(step_px, variance);
-    rounded_alike(r2) / (r2 + 1.0 / 12.0)
+    of_words(0.0, noise(step_px, variance))
 }
 
-/// Covariance, steps^2, of the errors of rounding two readings of a pixel that differ by noise of variance
-/// 2 `r2`, steps^2.
-fn rounded_alike(r2: f64) -> f64 {
-    [1.0, 2.0, 3.0, 4.0].map(|k| 0.5 * wave(k, r2).powi(2)).iter().sum()
+/// Correlation of two frames' words where that of their noise, of variance `r2` (steps^2), is `rho`.
+fn of_words(rho: f64, r2: f64) -> f64 {
+    // The errors of rounding covary by the noise that is not common.
+    let rounding: f64 =
+        [1.0, 2.0, 3.0, 4.0].map(|k| 0.5 * wave(k, r2 * (1.0 - rho)).powi(2)).iter().sum();
+    (r2 * rho + rounding) / (r2 + 1.0 / 12.0)
 }
 
 /// Variance of the noise before it is rounded, steps^2; sigma holds the error of rounding.
@@ -201,7 +202,7 @@ mod tests {
             let whole = r * r + 1.0 / 12.0;
             let still = mean(truth.iter().map(|t| t[0].powi(2) / whole)).unwrap();
             approx::assert_relative_eq!(
-                still_share(STEP, places[0].variance),
+                correlation_of_rounding(STEP, places[0].variance),
                 still,
                 max_relative = 0.1
             );

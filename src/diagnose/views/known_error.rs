@@ -12,7 +12,6 @@ use crate::diagnose::search::evidence::Evidence;
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::variance::error_of_sigma;
 use crate::model::{Domain, SigmaModel};
-use crate::solve::plane_through;
 use crate::terms::{PixelContext, Statistic, Term};
 
 /// Probability that a correct model differs by more than its own error.
@@ -167,9 +166,7 @@ impl Survey {
 /// Subtracts the terms from a view's means, without the plane through them.
 fn absorb(view: &mut SurveyedView, terms: &[Term]) {
     let mut off: Vec<f64> = view.places.iter().map(|p| Term::sum(terms, p)).collect();
-    let measured = view.patches().zip(&off).filter(|((_, t), _)| t.mean.is_finite());
-    let points = measured.map(|((p, t), off)| ([p.x, p.y], *off, t.pixels));
-    if let Some(plane) = plane_through(points) {
+    if let Some(plane) = view.plane_through(off.iter().copied()) {
         let on_plane = view.places.iter().map(|p| plane.dot(&Vector3::new(1.0, p.x, p.y)));
         off.iter_mut().zip(on_plane).for_each(|(off, plane)| *off -= plane);
     }
@@ -206,13 +203,10 @@ mod tests {
             (place, Tile { mean, pixels: 16.0, ..Tile::of_noise(1.0, 16.0) })
         });
         let mut view = SurveyedView::white(patches, 1.0);
-        let points = |v: &SurveyedView| -> Vec<([f64; 2], f64, f64)> {
-            v.patches().map(|(p, t)| ([p.x, p.y], t.mean, t.pixels)).collect()
-        };
-        let before = plane_through(points(&view).into_iter()).expect("a plane");
+        let before = view.plane_through(view.tiles.iter().map(|t| t.mean)).expect("a plane");
         absorb(&mut view, &bowl);
-        for ([x, y], mean, _) in points(&view) {
-            let on_plane = before.dot(&Vector3::new(1.0, x, y));
+        for (PixelContext { x, y, .. }, Tile { mean, .. }) in view.patches() {
+            let on_plane = before.dot(&Vector3::new(1.0, *x, *y));
             assert!((mean - on_plane).abs() < 1e-12, "{x}, {y}: {mean}, {on_plane}");
         }
         assert!((before[0] - 0.3).abs() > 1e-4, "the bowl has a level of its own: {before}");

@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
+
 use super::box_sums::take_out_cubic;
 use super::field::Field;
 use super::samples::{ViewData, finite};
 use super::tiles::Tile;
 use crate::diagnose::noise::texture::{same_pixel, without_bias};
+use crate::solve::plane_through;
 use crate::stats::{Correlation, measure_correlation};
 use crate::terms::PixelContext;
 
@@ -145,6 +148,12 @@ impl SurveyedView {
     /// Same with mutable places and tiles.
     pub fn patches_mut(&mut self) -> impl Iterator<Item = (&mut PixelContext, &mut Tile)> {
         Arc::make_mut(&mut self.places).iter_mut().zip(Arc::make_mut(&mut self.tiles))
+    }
+
+    /// Plane through one value a patch, over the patches that have a mean, weighted by their pixels.
+    pub fn plane_through(&self, values: impl Iterator<Item = f64>) -> Option<Vector3<f64>> {
+        let measured = self.patches().zip(values).filter(|((_, t), _)| t.mean.is_finite());
+        plane_through(measured.map(|((p, t), value)| ([p.x, p.y], value, t.pixels)))
     }
 }
 

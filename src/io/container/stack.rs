@@ -119,12 +119,11 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     }
     let stacks: Vec<usize> =
         (0..arrays.len()).filter(|&i| arrays[i].header.shape.len() > 2).collect();
-    let named = |names: Vec<&str>| names.join(", ");
+    let all = || members.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
     let chosen = match (&assumed.topic, &stacks[..]) {
         (Some(topic), _) => {
             arrays.iter().position(|a| a.name == Some(topic.clone())).ok_or_else(|| {
-                let all = named(members.iter().map(|m| m.name.as_str()).collect());
-                let what = format!("there is no array {topic}; these are: {all}");
+                let what = format!("there is no array {topic}; these are: {}", all());
                 Error::recording(path, what, "give one of them to --topic")
             })?
         }
@@ -133,13 +132,13 @@ pub fn open_npz(path: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
             if let Some(unread) = unread {
                 return Err(unread);
             }
-            let all = named(members.iter().map(|m| m.name.as_str()).collect());
-            let what = format!("no array is a stack of images; these are: {all}");
+            let what = format!("no array is a stack of images; these are: {}", all());
             return Err(Error::recording(path, what, REMEDY));
         }
         (None, _) => {
-            let names = stacks.iter().filter_map(|&i| arrays[i].name.as_deref()).collect();
-            let what = format!("several arrays are stacks of images: {}", named(names));
+            let names: Vec<&str> =
+                stacks.iter().filter_map(|&i| arrays[i].name.as_deref()).collect();
+            let what = format!("several arrays are stacks of images: {}", names.join(", "));
             return Err(Error::recording(path, what, "choose one with --topic"));
         }
     };
