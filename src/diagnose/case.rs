@@ -185,20 +185,20 @@ impl<'a> Case<'a> {
         self.at("searching the mean error", "testing the mean again");
         let (camera, level) = (&self.sensor().camera, self.search_level(Self::MEAN_LEVEL));
         let seed = self.options.seed;
-        let mut fine = self.survey.mean_data();
-        let mut found = self.survey.search_bias(&fine, camera, level, seed);
         // The second run starts with the weights of the first.
         let first = self.baseline.is_none() && !self.extended;
         if first && self.options.ablation == Ablation::None {
             // Steep parts of a bias and constant lines were taken for correlated noise: views weigh more
-            // once both are known.
+            // once both are known, for which large patches are enough.
+            let coarse = self.survey.coarse_mean_data();
+            let found = self.survey.search_bias(&coarse, camera, level, seed);
+            drop(coarse);
             let (terms, px) = self.everywhere(&found);
             let px = self.with_lines(&terms, px);
-            if self.survey.reweigh(&self.fields, &px) {
-                fine = self.survey.mean_data();
-                found = self.survey.search_bias(&fine, camera, level, seed);
-            }
+            self.survey.reweigh(&self.fields, &px);
         }
+        let fine = self.survey.mean_data();
+        let found = self.survey.search_bias(&fine, camera, level, seed);
         let outcome = self.survey.refit_bias(&fine, camera, found);
         drop(fine);
         let (terms, px) = self.everywhere(&outcome);
