@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::frame_series::{Excess, Jitter, MUCH, Squares};
+use super::frame_series::{Excess, Jitter, MUCH, Squares, of_excess};
 use super::structure::Structure;
 use super::texture_finding::TextureFinding;
 use super::view_mean::variance_px2;
@@ -88,6 +88,12 @@ impl FrameNoise {
         noise
     }
 
+    /// Scatter of all frames over what their pixels explain.
+    fn larger(&self, all: &[Jitter]) -> f64 {
+        let of_pixels = all.iter().map(|j| j.about.freedom * j.about.expected).sum::<f64>();
+        1.0 + self.extra_px2 * self.freedom / of_pixels
+    }
+
     /// Scatter of a view's own frames over the expected.
     fn ratio(&self, view: &Jitter) -> f64 {
         view.about.sum / (view.about.freedom * self.px2(view))
@@ -108,7 +114,7 @@ impl FrameNoise {
     }
 }
 
-/// Tests the frames' means; `rho` is the correlation found between successive frames.
+/// Tests the frames' means; `rho` is the correlation between successive frames, found or known.
 pub(in crate::diagnose) fn frame_means(
     views: &[Structure],
     known: &KnownTerms,
@@ -165,7 +171,8 @@ fn motion(all: &[Jitter], noise: &FrameNoise, level: f64, rho: f64) -> Option<Te
     let std_error = std_error.hypot(UNEVEN * velocity_mps);
     Some(TextureFinding {
         parameters: one("velocity_mps", velocity_mps, std_error),
-        p: p.max(1e-300),
+        // The better of two tests.
+        p: (2.0 * p).clamp(1e-300, 1.0),
         // As for a term: the squares that the lines explain.
         nats: 0.5 * n * line,
         ..TextureFinding::named(vec!["target-motion"], Statistic::Bias, Axis::Frame)
@@ -185,7 +192,7 @@ fn jitter(
     let Excess { p, nats, .. } = Excess::of(beside, much, level)?;
     // The total, as in a model.
     let sigma = noise.extra_px2.sqrt();
-    let error = UNEVEN.hypot(1.0 / (2.0 * noise.freedom).sqrt());
+    let error = UNEVEN.hypot(of_excess(noise.larger(all), noise.freedom));
     Some(TextureFinding {
         parameters: one("sigma_px", sigma, sigma * error),
         size_sigma: ((noise.extra_px2 - known_px2).max(0.0) / variance_px2.max(1e-12)).sqrt(),

@@ -109,7 +109,8 @@ fn pixels_of_lines(views: &[(&Field, &[f32])], width: usize, lines: usize, axis:
     sums.iter().zip(&squares).map(of).take(lines).collect()
 }
 
-/// Mean of a line, and its variance with the views as the sample; zero with too few readings.
+/// Mean of a line, and its variance with the views as the sample (HC2: MacKinnon and White 1985); zero with too
+/// few readings, or in a single view.
 fn of_line(views: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     let (mut sum, mut n) = (0.0, 0.0);
     views.clone().for_each(|(s, k)| (sum, n) = (sum + s, n + k));
@@ -117,12 +118,14 @@ fn of_line(views: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
         return (0.0, 0.0);
     }
     let mean = sum / n;
-    let (mut square, mut seen) = (0.0, 0.0);
+    let mut square = 0.0;
     for (s, k) in views.filter(|v| v.1 > 0.0) {
-        square += (s - k * mean).powi(2);
-        seen += 1.0;
+        if k >= n {
+            return (0.0, 0.0);
+        }
+        square += (s - k * mean).powi(2) / (1.0 - k / n);
     }
-    (mean, square / (n * n) * seen / f64::max(seen - 1.0, 1.0))
+    (mean, square / (n * n))
 }
 
 #[cfg(test)]

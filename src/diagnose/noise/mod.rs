@@ -56,6 +56,7 @@ pub fn texture_findings(
         .iter()
         .find(|h| h.families.first() == Some(&"temporal-correlation"))
         .and_then(|h| h.parameters["rho"]["value"].as_f64())
+        .or_else(|| known.parameter("temporal-correlation", "rho"))
         .unwrap_or(0.0);
     found.extend(frame_means(views, known, level, rho));
     found.extend(unequal(views, level));

@@ -56,9 +56,10 @@ pub fn outliers(counts: &TailCounts, scatter: f64) -> Option<Outliers> {
             let bins = TAIL_EDGES.windows(2).zip(counts.between.iter().zip(&chance));
             let misfit = bins.map(|(w, (seen, chance))| {
                 let expected = chance + more * (beyond(w[0]) - beyond(w[1])) / inside;
-                let variance = expected + (SIGMA * expected).powi(2);
+                // At least that of one count: a single stray where none is expected is no proof.
+                let variance = (expected + (SIGMA * expected).powi(2)).max(1.0);
                 // Gaussian likelihood of a count, including its variance's own term.
-                0.5 * ((seen - expected).powi(2) / variance + variance.max(1.0).ln())
+                0.5 * ((seen - expected).powi(2) / variance + variance.ln())
             });
             nodes.push([misfit.sum(), fraction, scale]);
         }

@@ -63,6 +63,19 @@ fn intervals_hold_whatever_far_errors_are_drawn_from() {
     }
 }
 
+/// Where a tail of scale 2 ends, a single stray has almost no chance, and says nothing.
+#[test]
+fn one_stray_does_not_decide() {
+    let mut rng = Seed(2).stream("strays/one");
+    let mut counts = counted(&mut rng, 0.05, |rng| gaussian(rng, 2.0));
+    let before = outliers(&counts, 0.0).expect("strays");
+    counts.count(13.0);
+    let after = outliers(&counts, 0.0).expect("strays");
+    for (a, b) in [(after.fraction, before.fraction), (after.scale, before.scale)] {
+        assert!((a[0] - b[0]).abs() < b[1], "{a:?} after {b:?}");
+    }
+}
+
 #[test]
 fn gross_errors_are_no_tail() {
     let mut rng = Seed(1).stream("strays/gross");

@@ -60,8 +60,9 @@ pub fn tails(
     let mut parameters = Map::new();
     parameters.insert("share_beyond_4_sigma".into(), json!(share.value));
     let heavy = much * HEAVY * own;
-    if share.value >= heavy && share.p_above(expected) <= level {
-        return far_out(views, parameters, own, share.p_above(own), confusers);
+    let p = share.p_above(expected);
+    if share.value >= heavy && p <= level {
+        return far_out(views, parameters, own, p, confusers);
     }
     // Second test of tails at this level.
     let of_some = || tailed_views(views, expected, heavy);

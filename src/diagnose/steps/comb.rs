@@ -149,8 +149,10 @@ pub fn steps_of_words(words: &[(usize, f64)]) -> Option<(f64, f64)> {
     let first = (0..tries).into_par_iter().find_first(holds)?;
     let last = (first..tries).take_while(holds).last()?;
     let frequency = 0.5 * (scan(first) + scan(last));
-    // Probability of each word to lie within the arc that begins at one of them.
-    let n = near.len() as f64;
+    // Probability of each word to lie within the arc that begins at one of them. Rare words, which may lie
+    // anywhere, are not counted: the effective number of the weights.
+    let [sum, squares] = [1, 2].map(|k| near.iter().map(|p| p.1.powi(k)).sum::<f64>());
+    let n = sum * sum / squares;
     let p = (n * tries as f64 * frequency.powf(n - 1.0)).max(f64::MIN_POSITIVE);
     (p < CHANCE).then_some((frequency.recip(), p))
 }

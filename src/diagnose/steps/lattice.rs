@@ -274,6 +274,24 @@ mod tests {
         assert!((own.size / word_px - 1.0).abs() < 1e-9 && own.p.is_none(), "{own:?}");
     }
 
+    /// Six targets of two words each, and single strays anywhere: two neighbours a target hold any step's phase.
+    #[test]
+    fn rare_words_are_no_evidence_of_a_step() {
+        let mut rng = Seed(5).stream("lattice/strays");
+        for _ in 0..6 {
+            let mut words = RawHistogram::default();
+            for _ in 0..6 {
+                let middle = rng.random_range(620..900);
+                for word in [middle, middle + 1] {
+                    words.0[word] += rng.random_range(20_000..40_000);
+                }
+            }
+            (0..200).for_each(|_| words.0[rng.random_range(600..920)] += 1);
+            let occurring = words.occurring();
+            assert_eq!(super::steps_of_words(&occurring), None);
+        }
+    }
+
     #[test]
     fn steps_of_matcher_and_driver_are_found_and_none_where_there_are_none() {
         let sensor = kinect_v1(1);

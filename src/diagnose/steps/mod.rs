@@ -100,13 +100,14 @@ const SAME_STEP: f64 = 0.005;
 /// Relative standard error of a step that was scanned for.
 const SCANNED: f64 = 0.002;
 
-/// Standard error of a step. A whole number of units has none: it is the greatest that divides all words.
-fn error(step: Step, code: &DepthCode) -> f64 {
-    let units = match code {
+/// Standard error of a step. A whole number of units or words has none: it is the greatest that divides all.
+fn error(step: Step, recording: &Recording, px_m: f64) -> f64 {
+    let units = match recording.sensor.code {
         DepthCode::Metric { units_per_metre, .. } if step.is_of_depth => {
             step.size * units_per_metre
         }
-        _ => f64::NAN,
+        _ if step.is_of_depth => f64::NAN,
+        _ => word_px(recording, px_m).map_or(f64::NAN, |word| step.size / word),
     };
     if (units - units.round()).abs() < 1e-9 * units { 0.0 } else { SCANNED * step.size }
 }
@@ -133,7 +134,7 @@ pub(in crate::diagnose) fn own_step_note(step: f64) -> String {
 /// 2008). The error of coarser steps follows the surface.
 pub(in crate::diagnose) const COARSE_SIGMAS: f64 = 2.0;
 
-/// Drops windows and line variances of views with coarse steps other than those of the recording's own words.
+/// Drops windows, line variances and the sizes of single frames of views with coarse steps other than those of the recording's own words.
 /// Neighbours in one step err together, and whether a pixel jumps between frames depends on where in a step its
 /// line lies.
 pub(in crate::diagnose) fn forget_windows(
@@ -151,6 +152,8 @@ pub(in crate::diagnose) fn forget_windows(
         if step.px(f.scale_px_m, f.plane.depth(0.0, 0.0)) > COARSE_SIGMAS * sigma {
             (s.window_px, s.neighbour_correlation, s.correlation_profile) = (None, None, None);
             (s.row_px2, s.column_px2) = (None, None);
+            // Without the window's size the error of a frame's size is unknown.
+            s.frame_pixels = 0.0;
         }
     }
 }
@@ -241,8 +244,9 @@ pub(in crate::diagnose) fn steps(
     recording: &Recording,
     second: &[bool],
 ) -> Vec<Finding> {
-    let disparity_counts = recording.sensor.may_have_disparity()
-        && own_step(step, recording, fields[0].scale_px_m).is_none();
+    let px_m = fields[0].scale_px_m;
+    let disparity_counts =
+        recording.sensor.may_have_disparity() && own_step(step, recording, px_m).is_none();
     let found = |kind: &Kind| {
         let step = kind.of(step).filter(|_| disparity_counts || kind.is_of_depth())?;
         let strongest = kind.added(step.size, fields).fold(0.0, f64::max).sqrt();
@@ -257,7 +261,7 @@ pub(in crate::diagnose) fn steps(
         let depths = || crate::stats::range(fields.iter().map(|f| f.plane.depth(0.0, 0.0)));
         Some(Finding {
             interval: if kind.is_of_depth() { depths() } else { [0.0, 1.0] },
-            parameters: one(kind.parameter, step.size, error(step, &recording.sensor.code)),
+            parameters: one(kind.parameter, step.size, error(step, recording, px_m)),
             p_adjusted: step.p,
             replicated: Some(halves[0].zip(halves[1]).is_some_and(|(a, b)| same(a, b))),
             ..kind.finding(step.size, fields)

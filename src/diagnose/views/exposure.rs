@@ -17,6 +17,8 @@ const MIN_SPREAD_PX: f64 = 0.5;
 /// Factor by which the spread about the model must exceed the view's own for the model to be wrong. With a
 /// correct model the two agree to a few per cent.
 const FAR_OFF: f32 = 2.0;
+/// Least share of the mean number of pixels for a frame's mean and line to count.
+const MIN_SHARE: f64 = 0.8;
 
 impl Field {
     /// Collects the residuals of all frames, each given with its time since the first, s.
@@ -31,6 +33,7 @@ impl Field {
         let mut expected = self.known_bias(known, bench);
         let mut clip_px = self.spread_px;
         let mut edges = Edges::default();
+        let mut seen = Vec::new();
         for (time, image) in frames {
             if self.frames.is_empty() {
                 if !known.bias.is_empty() {
@@ -45,12 +48,24 @@ impl Field {
                 of_pixels.for_each(|(&i, d)| *d += self.column_error(i));
             }
             edges.add(self, &image, &bench.rays, &bench.table);
-            self.add(&image, time, &expected, &bench.table, clip_px);
+            seen.push(self.add(&image, time, &expected, &bench.table, clip_px));
         }
+        self.forget_partial(&seen);
         self.edges = edges;
         for ((mean, square), n) in self.mean.iter_mut().zip(&mut self.square).zip(&self.count) {
             *mean /= f32::from(*n);
             *square /= f32::from(*n);
+        }
+    }
+
+    /// Drops the means and lines of frames that lost much: they are of another part of the target, which need not
+    /// have the same mean. `seen` is the number of pixels of each frame.
+    fn forget_partial(&mut self, seen: &[f64]) {
+        let whole = MIN_SHARE * seen.iter().sum::<f64>() / seen.len().max(1) as f64;
+        let frames = self.frames.iter_mut().zip(&mut self.lines).zip(seen);
+        for ((frame, line), _) in frames.filter(|(_, n)| **n < whole || **n == 0.0) {
+            frame.1 = f64::NAN;
+            *line = [f64::NAN; 2];
         }
     }
 
@@ -120,7 +135,7 @@ impl Field {
         expected: &[f32],
         table: &DepthTable,
         clip_px: f32,
-    ) {
+    ) -> f64 {
         let keep = self.first.len() < FRAMES_KEPT;
         let mut residuals = if keep { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
         let (mut sum, mut n) = (0.0f64, 0.0f64);
@@ -166,6 +181,28 @@ impl Field {
             0.0
         };
         self.lines.push([(sum - slope * sx) / f64::max(n, 1.0), slope]);
-        self.frames.push((time, if n > 0.0 { sum / n } else { f64::NAN }));
+        self.frames.push((time, sum / f64::max(n, 1.0)));
+        n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hand before the target in one frame: what is left has another mean, which is no motion.
+    #[test]
+    fn frames_that_lost_much_do_not_count() {
+        let mut field = Field {
+            frames: vec![(0.0, 0.01), (0.03, 0.5), (0.06, 0.01), (0.09, 0.0)],
+            lines: vec![[0.01, 0.0], [0.5, 0.0], [0.01, 0.0], [0.0; 2]],
+            ..Field::default()
+        };
+        field.forget_partial(&[1000.0, 400.0, 990.0, 0.0]);
+        let kept: Vec<bool> = field.frames.iter().map(|f| f.1.is_finite()).collect();
+        assert_eq!(kept, [true, false, true, false]);
+        assert_eq!(field.moved_px2(0.0), 0.0);
+        field.forget_partial(&[0.0; 4]);
+        assert_eq!(field.moved_px2(0.0), 0.0);
     }
 }

@@ -51,10 +51,11 @@ pub struct Field {
     pub column_steps: Option<ColumnSteps>,
     /// Residuals of the first frames, px, in order.
     pub first: Vec<Vec<f32>>,
-    /// Time and mean residual of each frame, s since the first and px.
+    /// Time and mean residual of each frame, s since the first and px; NaN where it lost many pixels.
     pub frames: Vec<(f64, f64)>,
     pub left_out: LeftOut,
-    /// Line through each frame's residuals over the disparity: value at the view's middle, px, and slope.
+    /// Line through each frame's residuals over the disparity: value at the view's middle, px, and slope; NaN
+    /// where it lost many pixels.
     pub lines: Vec<[f64; 2]>,
     pub reference_distance_m: Option<f64>,
     /// Flatness of the target as the view states it, m.
@@ -166,13 +167,13 @@ impl Field {
     /// pixel noise.
     pub fn moved_px2(&self, disparity: f64) -> f64 {
         let x = disparity - self.scale_px_m * self.plane.q.z;
-        let n = self.lines.len() as f64;
+        let at = self.lines.iter().map(|line| line[0] + line[1] * x).filter(|e| e.is_finite());
+        let n = at.clone().count() as f64;
         if n < 2.0 {
             return 0.0;
         }
-        let at = |line: &[f64; 2]| line[0] + line[1] * x;
-        let mean = self.lines.iter().map(at).sum::<f64>() / n;
-        self.lines.iter().map(|l| (at(l) - mean).powi(2)).sum::<f64>() / n
+        let mean = at.clone().sum::<f64>() / n;
+        at.map(|e| (e - mean).powi(2)).sum::<f64>() / n
     }
 
     /// Mean number of pixels measured in a frame.
