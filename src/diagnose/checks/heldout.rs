@@ -1,6 +1,5 @@
 //! Scores the found terms on held-out views, which had no part in any choice.
 
-use rand::Rng;
 use rand::seq::SliceRandom;
 
 use super::rms::rms;
@@ -13,10 +12,12 @@ use crate::diagnose::noise::scatter::ScatterResult;
 use crate::diagnose::noise::still::beside_bias;
 use crate::diagnose::views::field::Field;
 use crate::diagnose::views::samples::ViewData;
+use crate::stats::{mean, student_quantile};
 use crate::terms::{Statistic, Term};
 
-/// One view in this many is held out.
+/// One view in this many is held out, and of small recordings up to three in nine: few have no scatter of their own.
 const KEPT_ASIDE: usize = 4;
+const FEW_ASIDE: [usize; 2] = [3, 3];
 /// Fewest views from which any can be spared.
 const MIN_VIEWS: usize = 6;
 
@@ -37,7 +38,8 @@ impl Case<'_> {
         let mut rng = seed.stream("diagnose/heldout");
         let mut order: Vec<usize> = (0..n).collect();
         order.shuffle(&mut rng);
-        let mut aside = order[..(n / KEPT_ASIDE).max(1)].to_vec();
+        let [most, share] = FEW_ASIDE;
+        let mut aside = order[..(n / KEPT_ASIDE).max(most.min(n / share))].to_vec();
         aside.sort_unstable();
         let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
         let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
@@ -52,21 +54,24 @@ impl Case<'_> {
         let stored = self.as_stored();
         let means: Vec<ViewData> = judged_on.coarse_mean_data();
         let blocks = judged_on.variance_data();
+        let mut views = Vec::new();
         let mut before = Vec::new();
         let (mut of_bias, mut gains) = (Vec::new(), Vec::new());
         let of_lines = self.gained_by_lines(lines, &bias_terms, &rest, &aside);
         let of_textures = textures::gained(scatter, &self.known, [&rest, &aside]);
-        let others = of_lines.iter().zip(of_textures);
-        for ((mean, block), (lines, of_textures)) in means.iter().zip(&blocks).zip(others) {
-            let (b0, b1) = (log_score(mean, &stored)?, log_score(mean, &bias_terms)?);
+        let others = of_lines.iter().zip(of_textures).zip(&judged_on.views);
+        for ((mean, block), ((lines, of_textures), view)) in means.iter().zip(&blocks).zip(others) {
+            let score = |terms: &[Term]| log_score(mean, terms);
+            // A view that says nothing of its mean has no score.
+            let Some((b0, b1)) = score(&stored).zip(score(&bias_terms)) else { continue };
             let (v0, v1) = (noise_score(block, &[]), noise_score(block, &variance_terms));
+            views.push(view.name.clone());
             before.push(b0 + v0);
             of_bias.push(b1 - b0 + lines.nats);
             gains.push(b1 - b0 + v1 - v0 + lines.nats + of_textures);
         }
-        let views = before.len() as f64;
-        let mean_before = before.iter().sum::<f64>() / views;
-        let gain = gains.iter().sum::<f64>() / views;
+        let mean_before = mean(before.into_iter())?;
+        let gain = mean(gains.iter().copied())?;
         let by_lines: f64 = of_lines.iter().map(|l| l.px2).sum();
         let rms = |terms: &[Term], less_px2| rms(&judged_on.views, terms, scale_px_m, less_px2);
         let [px_before, mm_before] = rms(&stored, 0.0);
@@ -75,12 +80,12 @@ impl Case<'_> {
             bias_terms.iter().filter(|t| t.is_sensor_bias()).cloned().collect();
         let [px_corrected, _] = rms(&of_sensor, by_lines);
         Some(HeldOut {
-            views: aside.iter().map(|&v| survey.views[v].name.clone()).collect(),
+            views,
             log_score_before: mean_before,
             log_score_after: mean_before + gain,
             gain,
-            gain_interval: bootstrap(&gains, &mut rng),
-            bias_gain_interval: bootstrap(&of_bias, &mut rng),
+            gain_interval: interval_of_mean(&gains)?,
+            bias_gain_interval: interval_of_mean(&of_bias)?,
             rms_mm_before: mm_before,
             rms_mm_after: mm_after,
             rms_px_before: px_before,
@@ -111,7 +116,8 @@ impl Case<'_> {
         let of_view = |&v: &usize| {
             let ((field, bias), lines) = (all[v], &px[v]);
             let of_bias = |k: usize| bias.get(k).copied().unwrap_or(0.0);
-            let inflation = self.survey.views[v].inflation;
+            let view = &self.survey.views[v];
+            let inflation = view.inflation * view.row_inflation;
             let mut gain = LinesGain::default();
             for k in (0..lines.len()).filter(|&k| field.mean[k].is_finite()) {
                 let less = f64::from(lines[k] * (2.0 * (field.mean[k] - of_bias(k)) - lines[k]));
@@ -148,13 +154,11 @@ fn noise_score(blocks: &ViewData, terms: &[Term]) -> f64 {
     -left.iter().zip(&blocks.weight).map(|(log, w)| w * (log.exp_m1() - log)).sum::<f64>()
 }
 
-/// 95 % bootstrap interval of the mean.
-fn bootstrap(values: &[f64], rng: &mut crate::rng::Stream) -> [f64; 2] {
-    const RESAMPLES: usize = 2000;
-    let n = values.len();
-    let mut means: Vec<f64> = (0..RESAMPLES)
-        .map(|_| (0..n).map(|_| values[rng.random_range(0..n)]).sum::<f64>() / n as f64)
-        .collect();
-    means.sort_by(f64::total_cmp);
-    [means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40]]
+/// 95 % interval of the mean by Student's t; `None` with fewer than two values.
+fn interval_of_mean(values: &[f64]) -> Option<[f64; 2]> {
+    let n = values.len() as f64;
+    let middle = mean(values.iter().copied())?;
+    let square = values.iter().map(|x| (x - middle).powi(2)).sum::<f64>() / (n - 1.0);
+    let half = student_quantile(0.95, n - 1.0) * (square / n).sqrt();
+    (n >= 2.0).then_some([middle - half, middle + half])
 }

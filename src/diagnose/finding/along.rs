@@ -10,6 +10,8 @@ type OfPlace = Box<dyn Fn(&PixelContext) -> f64>;
 /// The axis along which a term is shown.
 pub struct Along {
     label: &'static str,
+    /// Of its interval.
+    pub unit: &'static str,
     value: OfPlace,
 }
 
@@ -17,6 +19,7 @@ impl Along {
     pub fn of(scene: &Scene<'_>, basis: &Basis) -> Self {
         let axis = basis.axis();
         let corner = scene.corner_px;
+        let is_ambient = matches!(basis, Basis::Log1p { over: Coordinate::Ambient(_) });
         let over = if let Basis::Curve { over, .. } = basis { Some(*over) } else { None };
         let (label, value): (&'static str, OfPlace) = match axis {
             Axis::Z => ("depth, m", Box::new(|p| p.z)),
@@ -41,6 +44,10 @@ impl Along {
             }
             Axis::TargetPosition => ("right on the board, m", Box::new(|p| p.right)),
             Axis::EdgeDistance => ("distance from the target's edge, px", Box::new(|p| p.edge)),
+            Axis::Intensity if is_ambient => (
+                "ambient light over the sensor's own",
+                Box::new(|p| Coordinate::Ambient(1.0).value(p)),
+            ),
             Axis::Intensity => {
                 ("infrared light of the surface, of the median", Box::new(|p| p.light))
             }
@@ -48,7 +55,7 @@ impl Along {
             Axis::Temperature => ("temperature, degrees Celsius", Box::new(|p| p.temperature_c)),
             _ => ("", Box::new(|p| p.z)),
         };
-        Along { label, value }
+        Along { label, unit: if is_ambient { "1" } else { axis.unit() }, value }
     }
 
     /// Interval that holds the middle nine tenths of the term's energy.

@@ -90,7 +90,11 @@ impl<'a> Contest<'a> {
             outcome.chosen.iter().filter(is_law).map(|c| &c.candidate.basis).collect();
         let others = (0..outcome.chosen.len()).filter(|&k| {
             let c = &outcome.chosen[k];
-            !std::ptr::eq(c, chosen) && !is_law(&c)
+            // The part of the chosen that planes absorb goes with it.
+            let is_gauge = matches!(c.candidate.basis, Basis::Affine { .. });
+            let of_chosen = |c| std::ptr::eq(c, chosen);
+            let is_own = of_chosen(c) || is_gauge && k > 0 && of_chosen(&outcome.chosen[k - 1]);
+            !is_own && !is_law(&c)
         });
         let terms = terms_of(outcome, statistic);
         let settled: Vec<Term> = others.map(|k| terms[k].clone()).collect();

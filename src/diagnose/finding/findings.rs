@@ -104,6 +104,7 @@ fn finding(scene: &Scene<'_>, outcome: &Outcome, group: &[usize], terms: &[Term]
         effect,
         alternatives,
         interval: along.interval(scene, &mine),
+        unit: along.unit,
         // Nats for now; `verdict::shares` turns them into shares.
         share: group.iter().map(|&k| outcome.chosen[k].gain).sum(),
         parameters,
@@ -160,7 +161,7 @@ pub fn map(scene: &Scene<'_>, outcome: &Outcome, level: f64) -> Vec<MapRow> {
             statistic: scene.statistic,
             axis,
             interval: along.interval(scene, &values),
-            unit: axis.unit(),
+            unit: along.unit,
             effect_size: size(scene, &values).sigma,
             p_adjusted: look.p,
         }

@@ -14,7 +14,7 @@ use crate::diagnose::checks::replication::spans;
 use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::solve::Cholesky;
-use crate::terms::Pixels;
+use crate::terms::{PixelContext, Pixels};
 
 /// Share of the variance, pixel by pixel, that the factors must hold. The rest is independent per node.
 const HELD: f64 = 0.98;
@@ -33,7 +33,7 @@ const ROUNDS: usize = 4;
 const SPARE: usize = 8;
 
 impl Joint<'_> {
-    /// Covariance of the coefficients of [`Joint::chosen`], approximated for planes at these disparities, px.
+    /// Covariance of the coefficients of [`Joint::chosen`], approximated for frontal planes as far as these places.
     /// `left` are the scores that the fit leaves in each view: views scatter beyond their noise, and
     /// the posterior is as much wider.
     pub fn error(
@@ -42,7 +42,7 @@ impl Joint<'_> {
         kept: &[usize],
         precision: &DVector<f64>,
         left: &[DVector<f64>],
-        (camera, disparities): (&Camera, [f64; 3]),
+        planes: (&Camera, [PixelContext; 3]),
     ) -> Option<Covariance> {
         let System { columns: places, held } = self.system(s, kept, precision);
         let n = places.len();
@@ -52,7 +52,7 @@ impl Joint<'_> {
         let scatter: f64 = left.iter().map(|e| mine(e).dot(&(&inverse * mine(e)))).sum();
         let free = inverse.component_mul(&information).sum();
         let covariance = inverse * (scatter / free.max(1.0)).max(1.0);
-        let seen = self.seen(&places, camera, disparities);
+        let seen = self.seen(&places, planes);
         // This metric weights every pixel alike, whatever its variance.
         let mut metric = DMatrix::zeros(n, n);
         for (row, variance) in seen.iter().zip(variances(&seen, &covariance)) {
@@ -96,26 +96,30 @@ impl Joint<'_> {
     }
 
     /// The columns at pixels of frontal planes.
-    fn seen(&self, places: &[usize], camera: &Camera, disparities: [f64; 3]) -> Vec<DesignRow> {
+    fn seen(
+        &self,
+        places: &[usize],
+        (camera, planes): (&Camera, [PixelContext; 3]),
+    ) -> Vec<DesignRow> {
         let rays = camera.rays();
         let pixels = Pixels::new(camera, &rays, 1.0);
-        let lines = |disparity| {
+        let lines = |plane| {
             let rows = (STRIDE / 2..camera.height).into_par_iter().step_by(STRIDE);
-            rows.map(move |v| (disparity, v))
+            rows.map(move |v| (plane, v))
         };
-        let of_line = |(disparity, v): (f64, usize)| {
+        let of_line = |(plane, v): (PixelContext, usize)| {
             let mut row = vec![0.0; self.all.b.len()];
             let mut seen = Vec::new();
             for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
                 let mut place = pixels.place(v * camera.width + u);
-                place.disparity = disparity;
+                (place.disparity, place.z) = (plane.disparity, plane.z);
                 self.columns.fill(&place, &mut row);
                 let columns = places.iter().map(|&k| row[k]).enumerate();
                 seen.push(DesignRow(columns.filter(|(_, g)| *g != 0.0).collect()));
             }
             seen
         };
-        disparities.into_par_iter().flat_map(lines).flat_map_iter(of_line).collect()
+        planes.into_par_iter().flat_map(lines).flat_map_iter(of_line).collect()
     }
 }
 
@@ -192,19 +196,20 @@ fn together(factors: &[DVector<f64>], n: usize) -> DMatrix<f64> {
     factors.iter().fold(DMatrix::zeros(n, n), |sum, f| sum + f * f.transpose())
 }
 
-/// Covariance enlarged to the variances with the views as the sample, where these are larger (White
-/// 1980; Liang and Zeger 1986).
-pub fn clustered(inverse: &DMatrix<f64>, beyond: &[DVector<f64>]) -> DMatrix<f64> {
+/// Covariance where the views' scores scatter `dispersion` times more than their information, enlarged to the
+/// variances with the views as the sample, where these are larger (White 1980; Liang and Zeger 1986). `inverse`
+/// is that of the information and the prior.
+pub fn clustered(inverse: &DMatrix<f64>, dispersion: f64, beyond: &[DVector<f64>]) -> DMatrix<f64> {
     let n = beyond.len() as f64;
     let mut square = DMatrix::zeros(inverse.nrows(), inverse.nrows());
     for e in beyond {
         let moved = inverse * e;
         square.ger(n / (n - 1.0).max(1.0), &moved, &moved, 1.0);
     }
-    let larger: Vec<f64> =
-        (0..inverse.nrows()).map(|i| (square[(i, i)] / inverse[(i, i)]).max(1.0).sqrt()).collect();
+    let posterior = inverse * dispersion;
+    let larger = |i: usize| (square[(i, i)] / posterior[(i, i)]).max(1.0).sqrt();
     DMatrix::from_fn(inverse.nrows(), inverse.nrows(), |i, j| {
-        inverse[(i, j)] * larger[i] * larger[j]
+        posterior[(i, j)] * larger(i) * larger(j)
     })
 }
 

@@ -21,7 +21,7 @@ use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::Gain;
 use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
-use crate::terms::Gauge;
+use crate::terms::{Gauge, PixelContext};
 use columns::Columns;
 use error::clustered;
 use fit::{Joint, Reduced};
@@ -104,8 +104,8 @@ impl Joint<'_> {
         let dispersion = if kept.is_empty() { 1.0 } else { (scatter / free).max(1.0) };
         let precision = &self.columns.precision * dispersion;
         let beta = whole.fit(&kept, &precision)?;
-        let errors = clustered(&held(dispersion)?, &beyond);
-        let planes = (camera, disparities(self.data));
+        let errors = clustered(&held(dispersion)?, dispersion, &beyond);
+        let planes = (camera, far_to_near(self.data));
         let is_told = second.contains(&true);
         let (halves, error) = rayon::join(
             || is_told.then(|| self.halves(second, s, &precision, &beta)).flatten(),
@@ -252,13 +252,13 @@ impl Joint<'_> {
     }
 }
 
-/// Far, middle and near disparities, px: the 10 %, 50 % and 90 % quantiles of the views' samples.
-fn disparities(data: &[ViewData]) -> [f64; 3] {
-    let mut all: Vec<f64> =
-        data.iter().flat_map(|v| v.places.iter().map(|p| p.disparity)).collect();
-    all.par_sort_unstable_by(f64::total_cmp);
-    [0.1, 0.5, 0.9]
-        .map(|share| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0))
+/// Far, middle and near places: the 10 %, 50 % and 90 % quantiles by the disparity of the views' samples.
+fn far_to_near(data: &[ViewData]) -> [PixelContext; 3] {
+    let mut all: Vec<&PixelContext> = data.iter().flat_map(|v| v.places.iter()).collect();
+    all.par_sort_unstable_by(|a, b| a.disparity.total_cmp(&b.disparity));
+    [0.1, 0.5, 0.9].map(|share| {
+        all.get((share * all.len() as f64) as usize).map_or_else(PixelContext::default, |p| **p)
+    })
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use statrs::function::factorial::ln_binomial;
 
 use super::candidate::{Candidate, RECALIBRATE};
@@ -22,7 +23,8 @@ use crate::diagnose::finding::pixels::terms_of;
 use crate::diagnose::finding::scene::{Scene, size};
 use crate::diagnose::views::samples::ViewData;
 use crate::rng::{Seed, Stream};
-use crate::stats::{MAD_TO_SIGMA, quantile};
+use crate::solve::Cholesky;
+use crate::stats::quantile;
 use crate::terms::{Basis, Term};
 
 /// Candidates with more columns fit single views too freely.
@@ -91,16 +93,19 @@ impl<'a> Tried<'a> {
         excess: f64,
     ) -> Option<Self> {
         let k = candidate.basis.count();
-        let mut squares = Vec::new();
-        for e in evidence.iter().filter(|e| e.a.trace() > 0.0) {
-            squares.push(evidence::fit(std::slice::from_ref(e), prior)?.dot(&e.b));
+        let mut ratios = Vec::new();
+        for e in &evidence {
+            let inverse = Cholesky::of(&e.a + DMatrix::identity(k, k) * prior)?.inverse();
+            // One view may show few of the columns.
+            let freedom = e.a.component_mul(&inverse).sum();
+            if freedom >= 0.5 {
+                let quarter = ChiSquared::new(freedom).ok()?.inverse_cdf(0.25);
+                ratios.push(e.b.dot(&(inverse * &e.b)) / quarter);
+            }
         }
-        // The lowest quarter of the views is noise even if nearly half of them have the cause (quartile
-        // of chi squared by Wilson and Hilferty 1931).
-        let (k, spread) = (k as f64, 2.0 / (9.0 * k as f64));
-        let expected = k * (1.0 - spread - spread.sqrt() / MAD_TO_SIGMA).powi(3);
-        let usual = quantile(&mut squares, 0.25).unwrap_or(0.0);
-        let scatter = excess * (usual / expected).max(1.0);
+        // The lowest quarter of the views is noise even if nearly half of them have the cause.
+        let usual = quantile(&mut ratios, 0.25).unwrap_or(0.0);
+        let scatter = excess * usual.max(1.0);
         // Only the evidence is scaled: the cost of choosing the views is paid in full.
         let evidence: Vec<Evidence> =
             evidence.iter().map(|e| Evidence { a: &e.a / scatter, b: &e.b / scatter }).collect();

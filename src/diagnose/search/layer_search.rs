@@ -175,7 +175,7 @@ fn cluster(found: &mut Outcome) {
     let Some(fit) = &mut found.fit else { return };
     let beyond: Vec<DVector<f64>> =
         found.evidence.iter().map(|e| &e.b - &e.a * &fit.beta).collect();
-    fit.covariance = clustered(&fit.covariance, &beyond);
+    fit.covariance = clustered(&fit.covariance, 1.0, &beyond);
     let eigen = fit.covariance.clone().symmetric_eigen();
     let factor = |k: usize| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt();
     found.covariance.factors =
