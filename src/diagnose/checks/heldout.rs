@@ -162,3 +162,17 @@ fn interval_of_mean(values: &[f64]) -> Option<[f64; 2]> {
     let half = student_quantile(0.95, n - 1.0) * (square / n).sqrt();
     (n >= 2.0).then_some([middle - half, middle + half])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Student's quantile of one degree of freedom is 12.706.
+    #[test]
+    fn few_views_have_wide_intervals() {
+        assert_eq!(interval_of_mean(&[500.0]), None);
+        assert_eq!(interval_of_mean(&[0.0; 4]), Some([0.0; 2]));
+        let [low, high] = interval_of_mean(&[10.0, 12.0]).expect("two views");
+        assert!((low - (11.0 - 12.706)).abs() < 1e-3 && (high - (11.0 + 12.706)).abs() < 1e-3);
+    }
+}

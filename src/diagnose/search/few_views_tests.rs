@@ -34,6 +34,28 @@ fn nearly_half_of_the_views_are_few() {
     assert_eq!((found.views.len(), found.gain > 90.0), (8, true), "{}", found.gain);
 }
 
+/// Of sixteen columns a view shows three. Views that scatter five times as much in the variance: their evidence
+/// counts a fifth, where sixteen degrees of freedom a view would let it pass whole.
+#[test]
+fn what_a_view_does_not_show_is_no_freedom_of_its_own() {
+    let curve = Candidate::curve(Basis::powers(Coordinate::Column, 16, Modulation::One));
+    let mut rng = Seed(8).stream("few-views/rank");
+    let mut one = |v: usize| {
+        let seen = |i: usize| (3 * v..3 * v + 3).any(|k| k % 16 == i);
+        let a = DVector::from_fn(16, |i, _| if seen(i) { 100.0 } else { 0.0 });
+        let white = DVector::from_fn(16, |_, _| StandardNormal.sample(&mut rng));
+        let b = a.map(|a: f64| (5.0 * a).sqrt()).component_mul(&white);
+        Evidence { a: DMatrix::from_diagonal(&a), b }
+    };
+    let mean = (0..40)
+        .map(|_| {
+            let tried = Tried::of(&curve, (0..24).map(&mut one).collect(), 0.1, 1.0).unwrap();
+            100.0 / tried.evidence[0].a.trace() * 3.0 / 40.0
+        })
+        .sum::<f64>();
+    assert!((3.5..7.0).contains(&mean), "{mean}");
+}
+
 #[test]
 fn noise_brings_less_than_the_choice_costs() {
     let gain = |n: u64| best(&views(&format!("few-views/{n}"), 0.0, 0), 0.1).unwrap().gain;
