@@ -77,10 +77,7 @@ impl Correction {
         model.refuse_other_size(sensor)?;
         let camera = sensor.camera.clone();
         // Terms are in px of the model's disparity.
-        let scale_px_m = of_model
-            .as_ref()
-            .and_then(Sensor::disparity_px_m)
-            .unwrap_or_else(|| sensor.scale_px_m());
+        let scale_px_m = of_model.as_ref().unwrap_or(sensor).scale_px_m();
         let mut correction = Correction {
             rays: camera.rays(),
             scale_px_m,

@@ -12,6 +12,7 @@ use crate::frame::Frame;
 use crate::measure::{MeasureOptions, Workbench};
 use crate::model::NoiseModel;
 use crate::solve::plane_through;
+use crate::terms::ANYWHERE;
 use crate::view::Sensor;
 
 /// One view, row by row, mm of depth, measured minus the plane; NaN off the target.
@@ -46,7 +47,7 @@ pub fn pictures(
 ) -> Vec<ViewPictures> {
     let bench = Workbench::new(sensor, MeasureOptions::default());
     let mut known = KnownTerms::of(model, &sensor.camera);
-    known.bias.extend(done.taken_out.iter().cloned());
+    known.bias.extend(done.taken_out.iter().map(|t| (t.clone(), ANYWHERE)));
     worth_seeing(done)
         .into_par_iter()
         .map(|view| {

@@ -197,6 +197,11 @@ pub(super) fn extend<'a>(
                 }
                 true
             });
+            // An effect of unmeasured strength is known, and is not simulated.
+            if let Some(strength) = card.parameters.first() {
+                let of = parameters.entry(strength.name);
+                of.or_insert_with(|| card.identity.into());
+            }
         }
         let shape = f.terms.clone();
         let bias = shape.iter().any(|t| t.statistic == Statistic::Bias);

@@ -60,7 +60,7 @@ impl Effect for AmbientLight {
         }
         // Ratio that reproduces the noise at the far end: scaled shapes of other ratios agree there, but
         // not at zero distance.
-        let far = PixelContext { z, ambient, ..PixelContext::default() };
+        let far = PixelContext { z, rho: z, ambient, ..PixelContext::default() };
         vec![fit.estimate("ratio", &|b| fit.value(b, far).exp_m1() / excess)]
     }
 

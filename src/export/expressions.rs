@@ -224,7 +224,8 @@ fn coordinate(over: Coordinate) -> String {
         Coordinate::LogLight => "0.0".into(),
         Coordinate::Ambient(ratio) => {
             let (ratio, room) = (number(ratio), number(ROOM_LUX));
-            let far = format!("p.z * p.z * (1.0 + {OFF_AXIS}) / fmax(cos(p.theta), 0.05)");
+            let square = format!("(p.z * p.z * (1.0 + {OFF_AXIS}))");
+            let far = format!("{square} / fmax(p.rho / sqrt({square}), 0.05)");
             format!("{ratio} * p.ambient / {room} * ({far})")
         }
     }

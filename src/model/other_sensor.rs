@@ -4,6 +4,7 @@ use super::file::NoiseModel;
 use super::surface::SigmaModel;
 use crate::error::{Error, Result};
 use crate::frame::DepthCode;
+use crate::sensors::KINECT_BASELINE_M;
 use crate::units::shortest;
 use crate::view::Sensor;
 
@@ -50,10 +51,14 @@ fn differences(model: &Sensor, sensor: &Sensor, sigma: &SigmaModel) -> Vec<Strin
             a.fx, a.fy, b.fx, b.fy
         ));
     }
-    if let (Some(a), Some(b)) = (model.baseline_m, sensor.baseline_m)
-        && far(a, b)
-    {
-        differences.push(format!("the model's baseline is {a} m, the recording's {b}"));
+    let of = |s: &Sensor| s.baseline_m.unwrap_or(KINECT_BASELINE_M);
+    if far(of(model), of(sensor)) {
+        let in_words = |s: &Sensor| {
+            let stated = if s.baseline_m.is_some() { "" } else { " (assumed)" };
+            format!("{} m{stated}", of(s))
+        };
+        let [a, b] = [model, sensor].map(in_words);
+        differences.push(format!("the model's baseline is {a}, the recording's {b}"));
     }
     differences.extend(rounding(model.code, sensor.code, sigma));
     differences
@@ -120,6 +125,11 @@ mod tests {
         assert_eq!(between(&raw, &sensor(588.0, RAW)), Vec::<String>::new());
         let other = between(&raw, &sensor(517.3, RAW));
         assert!(matches!(&other[..], [one] if one.contains("585.0, 585.0 px")), "{other:?}");
+        let unstated = Sensor { baseline_m: None, ..raw.clone() };
+        assert_eq!(between(&raw, &unstated), Vec::<String>::new());
+        let short = Sensor { baseline_m: Some(0.05), ..raw.clone() };
+        let other = between(&unstated, &short);
+        assert!(matches!(&other[..], [one] if one.contains("0.075 m (assumed)")), "{other:?}");
         // A Kinect's step at 2 m is 12.3 mm, whose rounding is 3.5 mm of Eq. 1's 6.5.
         let coded = between(&raw, &sensor(585.0, metric(5000.0)));
         assert!(

@@ -1,6 +1,9 @@
 //! Known values of each shape.
 
+use nalgebra::Vector3;
+
 use super::*;
+use crate::plane::Plane;
 
 const TIMES: Modulation = Modulation::DisparitySquared;
 const OVER: Coordinate = Coordinate::Disparity;
@@ -101,5 +104,19 @@ fn known_values() {
         powers.fill(&p, &mut row);
         let expected = [d, 1.0, d * d, d * d * d].map(|x| tilt * x);
         assert!(row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs()), "{row:?}");
+    }
+}
+
+/// Light on a tilted wall, by vectors: the square of the range over the cosine between ray and normal.
+#[test]
+fn the_pattern_falls_off_with_range_and_incidence() {
+    let plane = Plane::tilted(2.0, 1.0, 0.4);
+    for (x, y) in [(-0.4, 0.1), (0.0, 0.0), (0.3, -0.3)] {
+        let point = Vector3::new(x, y, 1.0) * plane.depth(x, y);
+        let facing = plane.normal().dot(&point.normalize()).abs();
+        let place =
+            PixelContext { x, y, z: point.z, rho: plane.distance(), ..PixelContext::default() };
+        let truth = point.norm_squared() / facing;
+        assert!((place.pattern_fall_off() / truth - 1.0).abs() < 1e-12);
     }
 }

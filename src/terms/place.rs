@@ -114,7 +114,7 @@ pub struct PixelContext {
     pub temperature_c: f64,
     /// Brightness of the surface in infrared over the recording's median; 1 where there is no infrared.
     pub light: f64,
-    /// Ambient light, lx; where unknown, 0 in a diagnosis and [`ROOM_LUX`] in a correction.
+    /// Ambient light, lx; where unknown, 0 in a search and [`ROOM_LUX`] for what a model knows.
     pub ambient: f64,
     /// Model's variance of a pixel's disparity, px^2.
     pub variance: f64,
@@ -124,9 +124,11 @@ pub struct PixelContext {
 pub type GroupMean<'a> = dyn Fn(&dyn Fn(usize) -> f64) -> f64 + 'a;
 
 impl PixelContext {
-    /// Factor by which the projected pattern's light comes back weaker than from a frontal target at 1 m.
+    /// Factor by which the projected pattern's light comes back weaker than from a frontal target at 1 m: with the
+    /// square of the range, and with the angle between the pixel's ray and the surface's normal.
     pub fn pattern_fall_off(&self) -> f64 {
-        self.z * self.z * (1.0 + self.x * self.x + self.y * self.y) / self.theta.cos().max(FLATTEST)
+        let range = self.z * (1.0 + self.x * self.x + self.y * self.y).sqrt();
+        range * range / (self.rho / range).max(FLATTEST)
     }
 
     /// Moves to the mean of the members' places; what is common to the view stays.

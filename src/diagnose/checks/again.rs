@@ -9,6 +9,7 @@ use crate::diagnose::finding::pixels::subtract_terms;
 use crate::diagnose::verdict::verdict;
 use crate::diagnose::views::known::KnownTerms;
 use crate::model::{Effect, NoiseModel};
+use crate::terms::Term;
 
 impl<'a> Case<'a> {
     /// What stands out against `extended`, and the case with its means restored; the first run `explained` so
@@ -21,7 +22,8 @@ impl<'a> Case<'a> {
         let added = self.added(extended);
         let means: Vec<Vec<f32>> = self.fields.iter().map(|f| f.mean.clone()).collect();
         let mut fields = std::mem::take(&mut self.fields);
-        subtract_terms(&mut fields, [&added.bias, &added.variance], self.survey.light, &self.bench);
+        let bias: Vec<Term> = added.bias_terms().cloned().collect();
+        subtract_terms(&mut fields, [&bias, &added.variance], self.survey.light, &self.bench);
         let mut case = self.again(fields, extended);
         let battery = case.battery();
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);

@@ -165,7 +165,8 @@ impl Case<'_> {
             findings(&laws, &self.known, excess, level, self.options.seed)
         };
         // A bowl moves the plane on the axis too, by an unknown constant.
-        let open = families(bias.iter().chain(&self.known.bias), &self.sensor().camera);
+        let of_model = self.known.bias_terms();
+        let open = families(bias.iter().chain(of_model.clone()), &self.sensor().camera);
         if !open.is_empty() {
             let laws = found(bias, &open);
             if !laws.is_empty() {
@@ -174,7 +175,7 @@ impl Case<'_> {
         }
         // All of it may be an offset of the disparity: a law must hold with and without the bowl, be that new
         // or the model's.
-        let model = self.known.bias.iter().filter(|t| !t.basis.is_nothing_ahead());
+        let model = of_model.filter(|t| !t.basis.is_nothing_ahead());
         let model: Vec<Term> = model.map(|t| t.times(-1.0)).collect();
         let mut laws = found(&plain, &[]);
         for others in [anchored.clone(), bias.to_vec(), [anchored, model].concat()] {

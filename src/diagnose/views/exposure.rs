@@ -10,7 +10,7 @@ use crate::frame::{DepthTable, Frame};
 use crate::measure::{ColumnSteps, Workbench};
 use crate::model::SigmaModel;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
-use crate::terms::Term;
+use crate::terms::{LearntTerm, ROOM_LUX, Term};
 
 /// Least standard deviation of the disparity over a view for fitting a slope, px.
 const MIN_SPREAD_PX: f64 = 0.5;
@@ -88,21 +88,30 @@ impl Field {
     }
 
     /// Disparity that the model expects at each pixel, px. Its variance terms scale `sigma`. Terms over the light
-    /// are left to [`KnownTerms::light_terms`].
+    /// are left to [`KnownTerms::light_terms`]. As in a correction, unknown ambient light is a room's, and without a
+    /// temperature there is no term over it.
     fn known_bias(&mut self, known: &KnownTerms, bench: &Workbench<'_>) -> Vec<f32> {
         let n = self.pixels.len();
         let mut expected: Vec<f32> =
             (0..n).map(|k| self.disparity(k, &bench.rays) as f32).collect();
-        let [bias, variance] = known.other_terms();
+        let applies = |t: &Term| {
+            let needs = t.needs();
+            !needs.light && (self.temperature_c.is_some() || !needs.temperature)
+        };
+        let bias: Vec<&LearntTerm> = known.bias.iter().filter(|(t, _)| applies(t)).collect();
+        let variance: Vec<&Term> = known.variance.iter().filter(|t| applies(t)).collect();
         if bias.is_empty() && variance.is_empty() {
             return expected;
         }
         let mut sigma = self.sigma.clone();
         let places = Places::of(self, &bench.sensor.camera, &bench.rays);
         for k in 0..n {
-            let place = places.pixel(k);
-            expected[k] += Term::sum(&bias, &place) as f32;
-            sigma[k] *= (0.5 * Term::sum(&variance, &place)).exp() as f32;
+            let mut place = places.pixel(k);
+            place.ambient = self.ambient_lux.unwrap_or(ROOM_LUX);
+            let px: f64 = bias.iter().map(|(t, learnt)| t.held_value(*learnt, &place)).sum();
+            expected[k] += px as f32;
+            let log: f64 = variance.iter().map(|t| t.value(&place)).sum();
+            sigma[k] *= (0.5 * log).exp() as f32;
         }
         self.sigma = sigma;
         expected
@@ -188,7 +197,52 @@ impl Field {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
+    use crate::measure::MeasureOptions;
+    use crate::model::{Effect, NoiseModel};
+    use crate::plane::Plane;
+    use crate::simulate::kinect_v1;
+    use crate::terms::{Basis, Coordinate, Modulation};
+
+    /// Known bias, px, and sigma, px, at the picture's corner: of a frontal target at this disparity, px, under so
+    /// much ambient light.
+    fn known_at(effect: Effect, disparity: f64, ambient_lux: Option<f64>) -> [f32; 2] {
+        let sensor = kinect_v1(1);
+        let bench = Workbench::new(&sensor, MeasureOptions::default());
+        let model = NoiseModel { effects: vec![effect], ..NoiseModel::paper() };
+        let scale_px_m = sensor.scale_px_m();
+        let plane = Plane::tilted(scale_px_m / disparity, 0.0, 0.0);
+        let mut field = Field::unseen(plane, scale_px_m, [640, 480], vec![0]);
+        (field.sigma, field.ambient_lux) = (vec![0.1], ambient_lux);
+        let expected = field.known_bias(&KnownTerms::of(&model, &sensor.camera), &bench);
+        [expected[0] - disparity as f32, field.sigma[0]]
+    }
+
+    /// As in a correction and a simulation: beyond the disparities at which it was learnt a bowl is that at their
+    /// edge; unknown light is a room's.
+    #[test]
+    fn what_is_known_is_what_a_correction_undoes() {
+        let bowl = || Effect {
+            id: "unexplained".into(),
+            shape: vec![Term::bias(
+                Basis::powers(Coordinate::RadiusSquared, 1, Modulation::DisparitySquared),
+                vec![1e-3],
+            )],
+            learnt_px: Some([11.0, 22.0]),
+            ..Effect::default()
+        };
+        let [inside, edge, near] = [15.0, 22.0, 40.0].map(|d| known_at(bowl(), d, None)[0]);
+        assert!((near - edge).abs() < 1e-4 && edge > 2.0 * inside, "{inside} {edge} {near}");
+        let lit = |lux| {
+            let id = "ambient-light".into();
+            let parameters = [("ratio".to_string(), json!(0.05))].into_iter().collect();
+            known_at(Effect { id, parameters, ..Effect::default() }, 15.0, lux)[1]
+        };
+        assert_eq!(lit(None), lit(Some(ROOM_LUX)));
+        assert!(lit(Some(0.0)) == 0.1 && lit(None) > 0.11);
+    }
 
     /// A hand before the target in one frame: what is left has another mean, which is no motion.
     #[test]

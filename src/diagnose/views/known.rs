@@ -6,13 +6,13 @@ use crate::camera::Camera;
 use crate::effects::{self, RAY_FOR_DEPTH};
 use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
 use crate::stats::mean;
-use crate::terms::{Axis, Basis, Statistic, Term, by_term};
+use crate::terms::{ANYWHERE, Axis, Basis, LearntTerm, Statistic, Term, by_term};
 
 /// The model's effects as terms; those without a formula by name only.
 #[derive(Debug, Clone, Default)]
 pub struct KnownTerms {
-    /// Terms of the disparity, px.
-    pub bias: Vec<Term>,
+    /// Terms of the disparity, px, each with the disparities at which it was learnt.
+    pub bias: Vec<LearntTerm>,
     /// Terms of the logarithm of its variance.
     pub variance: Vec<Term>,
     effects: Vec<Effect>,
@@ -30,9 +30,10 @@ impl KnownTerms {
             } else {
                 &effect.shape
             };
+            let learnt = effect.learnt_px.unwrap_or(ANYWHERE);
             for term in terms {
                 match term.statistic {
-                    Statistic::Bias => known.bias.push(term.clone()),
+                    Statistic::Bias => known.bias.push((term.clone(), learnt)),
                     Statistic::Variance => known.variance.push(term.clone()),
                     _ => {}
                 }
@@ -43,17 +44,14 @@ impl KnownTerms {
 
     /// Terms of the bias and of the variance over the light, which is known once all views are read.
     pub fn light_terms(&self) -> [Vec<Term>; 2] {
-        self.by_light(true)
+        let mine = |t: &&Term| t.needs().light;
+        let variance = self.variance.iter().filter(mine).cloned().collect();
+        [self.bias_terms().filter(mine).cloned().collect(), variance]
     }
 
-    /// Terms of the bias and of the variance over anything else.
-    pub fn other_terms(&self) -> [Vec<Term>; 2] {
-        self.by_light(false)
-    }
-
-    fn by_light(&self, light: bool) -> [Vec<Term>; 2] {
-        let mine = |t: &&Term| t.needs().light == light;
-        [&self.bias, &self.variance].map(|terms| terms.iter().filter(mine).cloned().collect())
+    /// Terms of the bias, wherever they were learnt.
+    pub fn bias_terms(&self) -> impl Iterator<Item = &Term> + Clone {
+        self.bias.iter().map(|(term, _)| term)
     }
 
     /// Marks a parameter of an effect as known, without subtracting anything.
@@ -84,7 +82,7 @@ impl KnownTerms {
 
     /// Share of the ray's excess over the depth that raw values hold.
     pub fn ray_share(&self) -> f64 {
-        ray_share(&self.bias)
+        ray_share(self.bias_terms())
     }
 
     /// Whether the size of the noise varies in a way that has no name.
@@ -204,8 +202,9 @@ impl KnownTerms {
 }
 
 /// Share of the ray's excess over the depth that these terms hold.
-pub fn ray_share(terms: &[Term]) -> f64 {
-    terms.iter().filter(|t| t.basis == RAY_FOR_DEPTH).map(|t| t.coefficients[0]).sum()
+pub fn ray_share<'a>(terms: impl IntoIterator<Item = &'a Term>) -> f64 {
+    let of_rays = terms.into_iter().filter(|t| t.basis == RAY_FOR_DEPTH);
+    of_rays.map(|t| t.coefficients[0]).sum()
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ fn what_is_known_is_told_with_the_same_numbers() {
             let known = KnownTerms::of(&model(id, json!({ name: form })), &camera);
             assert!(known.has(id) && !known.has("vignetting"));
             assert_eq!(known.parameter(id, name), Some(value));
-            let terms: Vec<&Term> = known.bias.iter().chain(&known.variance).collect();
+            let terms: Vec<&Term> = known.bias_terms().chain(&known.variance).collect();
             assert_eq!(terms.len(), 1, "{id}");
             let count = terms[0].basis.count();
             assert_eq!(terms[0].coefficients.len(), count, "{id}");
@@ -78,5 +78,5 @@ fn what_has_no_formula_is_known_by_name() {
     let term = Term { statistic: Statistic::Bias, basis: Basis::Level, coefficients: vec![3.0] };
     shaped.effects[0].shape = vec![term.clone()];
     let known = KnownTerms::of(&shaped, &camera);
-    assert!(known.variance.is_empty() && known.bias[0].coefficients == term.coefficients);
+    assert!(known.variance.is_empty() && known.bias[0].0.coefficients == term.coefficients);
 }

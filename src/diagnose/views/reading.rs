@@ -14,7 +14,7 @@ use crate::effects::RAY_FOR_DEPTH;
 use crate::error::{Error, Result};
 use crate::measure::Workbench;
 use crate::model::NoiseModel;
-use crate::terms::{Axis, PixelContext, Pixels, Statistic, Term};
+use crate::terms::{ANYWHERE, Axis, PixelContext, Pixels, Statistic, Term};
 use crate::view::{Excluded, Recording, take_out_copies};
 
 /// The usable views of a recording.
@@ -57,7 +57,7 @@ impl<'a> LoadedViews<'a> {
         if let Some((flat, p)) = as_ranges(recording, &bench, model, &known, &fields) {
             (fields, excluded) = flat;
             bench.ray_share = 1.0;
-            known.bias.push(range_term());
+            known.bias.push((range_term(), ANYWHERE));
             found = Some(ranges(p));
         }
         let copies = without_copies(&mut fields);
@@ -119,7 +119,7 @@ fn as_ranges(
     }
     let bench = Workbench { ray_share: 1.0, ..Workbench::new(bench.sensor, bench.options) };
     let mut told = known.clone();
-    told.bias.push(range_term());
+    told.bias.push((range_term(), ANYWHERE));
     let (fields, excluded) = read(recording, &bench, model, &told, &|_, _| ());
     if fields.len() < MIN_VIEWS {
         return None;

@@ -201,7 +201,7 @@ static inline double kinoise_solve(kinoise_place p, double measured, const float
 {
     double d = measured;
     int round;
-    for (round = 0; round < 8 && KINOISE_BIAS_TERMS && measured > 0.0; round++) {
+    for (round = 0; round < 64 && KINOISE_BIAS_TERMS && measured > 0.0; round++) {
         double next, change;
         kinoise_stand(&p, d, slope);
         next = measured - kinoise_bias(p, temperature);

@@ -158,7 +158,7 @@ def _solve(p, measured, slopes, temperature_c):
     d, going = measured.copy(), measured > 0.0
     if not _bias_terms:
         return d
-    for _ in range(8):
+    for _ in range(64):
         now = np.flatnonzero(going)
         if not len(now):
             break
