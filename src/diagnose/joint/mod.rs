@@ -104,7 +104,10 @@ impl Joint<'_> {
         let dispersion = if kept.is_empty() { 1.0 } else { (scatter / free).max(1.0) };
         let precision = &self.columns.precision * dispersion;
         let beta = whole.fit(&kept, &precision)?;
-        let errors = clustered(&held(dispersion)?, dispersion, &beyond);
+        let inverse = held(dispersion)?;
+        // Of the posterior; what the views alone would scatter by is less where the prior holds.
+        let errors = clustered(&inverse, dispersion, &beyond);
+        let scattered = clustered(&inverse, 1.0, &beyond);
         let planes = (camera, far_to_near(self.data));
         let is_told = second.contains(&true);
         let (halves, error) = rayon::join(
@@ -118,7 +121,7 @@ impl Joint<'_> {
             covariance: self.covariance_of_reported(s, &errors, told.len()),
             beta: DVector::from_vec(told),
         };
-        let disagreed = if is_told { self.disagreed(s, &beta, &errors) } else { Vec::new() };
+        let disagreed = if is_told { self.disagreed(s, &beta, &scattered) } else { Vec::new() };
         Some(Outcome {
             chosen: self.chosen(s, found, &disagreed),
             looks: found.looks.clone(),
