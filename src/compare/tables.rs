@@ -98,6 +98,9 @@ fn spreads(row: &Row, of: Column) -> TableRow {
         let deviation = (squares / (n - 1.0)).sqrt();
         remark = format!("   ± {deviation:.3} over {} runs", spreads.len());
     }
+    if let Some(why) = &row.failed {
+        remark += &format!("   one failed: {}", why.replace(char::is_control, "?"));
+    }
     TableRow { name, figures: means, remark }
 }
 

@@ -49,6 +49,8 @@ const DISTANCES: usize = 3;
 
 /// Degrees of freedom: practically infinite, because the fit uses all pixels of all views.
 const EXACT: f64 = 1e9;
+/// Share of a bias below which what is left beside the planes is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Effects whose bias can be compared, or the reason why there are none.
 pub(super) fn shapes(model: &NoiseModel) -> Result<Vec<&Effect>, String> {
@@ -123,7 +125,7 @@ pub(super) fn curve(model: &NoiseModel, effects: &[&Effect], distances: &[f64]) 
             if !usable(term) {
                 continue;
             }
-            let mut rows = DMatrix::zeros(n, span.len());
+            let (mut rows, mut whole) = (DMatrix::zeros(n, span.len()), 0.0);
             for (d, &z) in distances.iter().enumerate() {
                 let mut block = DMatrix::zeros(PIXELS, span.len());
                 let mut row = vec![0.0; span.len()];
@@ -135,9 +137,14 @@ pub(super) fn curve(model: &NoiseModel, effects: &[&Effect], distances: &[f64]) 
                     let depth = -z * z / scale;
                     row.iter().enumerate().for_each(|(j, v)| block[(k, j)] = depth * v);
                 }
-                rows.rows_mut(d * PIXELS, PIXELS).copy_from(&(&without_plane * block));
+                let left = &without_plane * &block;
+                whole = f64::max(whole, block.amax());
+                rows.rows_mut(d * PIXELS, PIXELS).copy_from(&left);
             }
-            sum.add(effect, span, term, &rows);
+            // A bias that is the same all over a frontal wall leaves rounding errors only.
+            if rows.amax() > ROUNDING * whole {
+                sum.add(effect, span, term, &rows);
+            }
         }
     }
     let mut covariance = sum.own;

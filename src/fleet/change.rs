@@ -21,7 +21,7 @@ pub struct Change {
     pub to: PathBuf,
     pub to_created: String,
     pub sigma: ChangeOfSigma,
-    /// Null where one of the models holds no measured bias.
+    /// Null where one of the models holds no measured bias, or none at a distance that both have seen.
     pub bias: Option<ChangeOfBias>,
     /// Ids of effects only in the newest model, and only in the older one.
     pub found_now: Vec<String>,

@@ -12,6 +12,16 @@ pub fn flatness_uncertainty_m(flatness_m: f64) -> f64 {
     flatness_m / 12f64.sqrt()
 }
 
+/// Effective degrees of freedom of the plane's distance (Welch and Satterthwaite, GUM G.4.1): its pixels are many,
+/// but whole frames that shift are a sample of a few.
+fn degrees_of_freedom(m: &ViewMeasurement) -> f64 {
+    let [all, shifts] = [m.whole.mean_std_error_m, m.whole.shift_std_error_m].map(|u| u * u);
+    let of_shifts = if all > 0.0 { shifts / all } else { 0.0 };
+    let pixels = (m.whole.n_effective - PLANE_PARAMETERS).max(1.0);
+    let frames = (m.frames as f64 - 1.0).max(1.0);
+    1.0 / ((1.0 - of_shifts).powi(2) / pixels + of_shifts.powi(2) / frames)
+}
+
 /// Budget of the error of indication: depth of the fitted plane on the optical axis minus the reference.
 /// `None` where the recording does not state the uncertainty of the reference, which is mostly the largest
 /// component: a budget without it would promise too much.
@@ -19,9 +29,9 @@ pub fn distance_budget(m: &ViewMeasurement, notes: &ViewNotes, sensor: &Sensor) 
     let reference_u_m = notes.reference_uncertainty_m?;
     let error_m = m.reference()?.off_m();
     let z = m.axis_distance_m;
-    let freedom = (m.whole.n_effective - PLANE_PARAMETERS).max(1.0);
+    let noise = "noise of the plane on the optical axis";
     let mut components = vec![
-        Component::type_a("noise of the plane on the optical axis", m.axis_std_error_m, freedom),
+        Component::type_a(noise, m.axis_std_error_m, degrees_of_freedom(m)),
         Component::type_b("reference distance", Distribution::Normal, reference_u_m),
     ];
     if let Some(flatness) = notes.target.and_then(|t| t.flatness_m) {

@@ -29,8 +29,9 @@ pub struct Cell {
     pub spread: Spread,
     /// Standard error of the spatial sigma, m.
     pub std_error_m: f64,
-    /// Standard error of the mean depth, m.
+    /// Standard error of the mean depth, m, and the part of it by shifts of whole frames.
     pub mean_std_error_m: f64,
+    pub shift_std_error_m: f64,
     /// Samples (pixels times frames) used.
     pub n: usize,
     /// Effective number of independent samples for a variance.
@@ -104,6 +105,8 @@ pub(super) struct Sums {
     pub pixels: f64,
     /// Number of merged bins: each has its own frame means in `between`.
     pub bins: f64,
+    /// Part of `between` by shifts of whole frames, bin by bin.
+    pub shared: f64,
 }
 
 impl Sums {
@@ -120,6 +123,7 @@ impl Sums {
         self.cut += other.cut;
         self.pixels += other.pixels;
         self.bins += other.bins;
+        self.shared += other.shared;
     }
 }
 
@@ -157,15 +161,17 @@ impl Context {
         let moving_frames = 1.0 + (frames - 1.0) * self.temporal_dilution();
         let absorbed = self.absorbed(frozen, moving_frames);
         let unbias = 1.0 / (1.0 - absorbed);
-        let shared = self.shared_by_a_frame(s, within.unwrap_or(0.0));
-        let spatial = ((s.e2 - shared).max(0.0) / s.n / self.cut_factor) * unbias;
+        let spatial = ((s.e2 - s.shared).max(0.0) / s.n / self.cut_factor) * unbias;
         let total = total * unbias;
         // Squares of the covariance between two frames: frozen^2 off the diagonal.
         let moving = 1.0 - frozen;
-        let worth = frozen * frozen + moving * (moving + 2.0 * frozen) / moving_frames;
+        let between = 2.0 * frozen * moving / self.independent_frames(frames);
+        let worth = frozen * frozen + moving * moving / moving_frames + between;
         let n_effective = (s.pixels / self.correlation_squares / worth).min(s.n).max(1.0);
         let root = |variance: f64| variance.sqrt() * crate::stats::std_unbias(n_effective);
         let spatial_m = root(spatial);
+        let [mean_std_error_m, shift_std_error_m] =
+            self.mean_std_errors_m(s, spatial, frozen, within.unwrap_or(0.0));
         Some(Cell {
             z_m: s.z / s.n,
             spread: Spread {
@@ -175,7 +181,8 @@ impl Context {
                 perpendicular_m: root(s.p2 / s.n / self.cut_factor * unbias),
             },
             std_error_m: spatial_m / (2.0 * n_effective).sqrt(),
-            mean_std_error_m: self.mean_std_error_m(s, spatial, frozen, within.unwrap_or(0.0)),
+            mean_std_error_m,
+            shift_std_error_m,
             n: s.n as usize,
             n_effective,
             n_effective_temporal: (s.pixels / self.correlation_squares * (moving_frames - 1.0))
@@ -185,17 +192,17 @@ impl Context {
         })
     }
 
-    /// Standard error of the mean depth, from the variance `spatial` of a frame, its share `frozen` that more
+    /// Standard error of the mean depth and its part by shifts, from the variance `spatial` of a frame, its share `frozen` that more
     /// frames do not average out, and the shifts of whole frames beyond the variance `within` pixels.
-    fn mean_std_error_m(&self, s: &Sums, spatial: f64, frozen: f64, within: f64) -> f64 {
-        let further = (s.n / s.pixels.max(1.0)).max(1.0) - 1.0;
-        // The mean of a first-order filter: (1 - rho)/(1 + rho) independent frames per frame.
-        let frames = 1.0 + further * (1.0 - self.temporal_rho) / (1.0 + self.temporal_rho);
+    fn mean_std_errors_m(&self, s: &Sums, spatial: f64, frozen: f64, within: f64) -> [f64; 2] {
+        let frames = (s.n / s.pixels.max(1.0)).max(1.0);
+        let further = frames - 1.0;
         let pixels = (s.pixels / self.correlation_sum.max(1.0)).max(1.0);
-        let of_pixels = spatial * (frozen + (1.0 - frozen) / frames) / pixels;
+        let moving = (1.0 - frozen) / self.independent_frames(frames);
+        let of_pixels = spatial * (frozen + moving) / pixels;
         let shared = self.beyond_chance(s, within);
         let of_frames = if further > 0.0 { shared / s.n / further } else { 0.0 };
-        (of_pixels + of_frames).sqrt()
+        [of_pixels + of_frames, of_frames].map(f64::sqrt)
     }
 
     /// Sum of squares between the frames' means beyond noise; zero within three standard errors of noise,
@@ -208,7 +215,13 @@ impl Context {
         if clear { s.between - noise * freedom } else { 0.0 }
     }
 
-    /// Independent frames per frame, for the moving part: the squares of a first-order correlation sum to
+    /// Independent frames for the mean of the moving part: of a first-order filter (1 - rho)/(1 + rho) per further
+    /// frame.
+    fn independent_frames(&self, frames: f64) -> f64 {
+        1.0 + (frames - 1.0) * (1.0 - self.temporal_rho) / (1.0 + self.temporal_rho)
+    }
+
+    /// Independent frames per frame, for the variance of the moving part: the squares of a first-order correlation sum to
     /// (1 + rho^2) / (1 - rho^2).
     fn temporal_dilution(&self) -> f64 {
         let square = self.temporal_rho * self.temporal_rho;
@@ -224,9 +237,10 @@ impl Context {
         within / cut / (1.0 - mean_correlation(self.temporal_rho, frames))
     }
 
-    /// Sum of squares between frames beyond that of noise correlated between neighbours: shifts of whole
-    /// frames, which are no spread over the pixels.
-    fn shared_by_a_frame(&self, s: &Sums, within: f64) -> f64 {
+    /// Sum of squares between the frames of a bin beyond that of noise correlated between neighbours: shifts of
+    /// whole frames, which are no spread over the pixels.
+    pub fn shared_by_a_frame(&self, s: &Sums) -> f64 {
+        let within = if s.within_dof > 0.0 { s.within / s.within_dof } else { 0.0 };
         let by_noise = (self.frames - 1.0) * within * self.correlation_sum.min(s.pixels);
         (s.between - by_noise).max(0.0)
     }
@@ -295,7 +309,9 @@ mod tests {
         // Ten frames that jump as a whole with a variance of 0.12 leave a tenth of it in the mean; noise
         // adds 9 to their sum of squares.
         let between = 1000.0 * 9.0 * 0.12 + 9.0;
-        let jumping = context.cell(&Sums { within: 9000.0, between, ..base }).unwrap();
+        let jumps = Sums { within: 9000.0, between, ..base };
+        let shared = context.shared_by_a_frame(&jumps);
+        let jumping = context.cell(&Sums { shared, ..jumps }).unwrap();
         let expected = 0.012 + (1.0 - 0.108) * 1e-4;
         assert!((jumping.mean_std_error_m.powi(2) - expected).abs() < 1e-6, "{jumping:?}");
     }

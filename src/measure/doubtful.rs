@@ -80,6 +80,7 @@ mod tests {
             spread,
             std_error_m,
             mean_std_error_m: 0.0,
+            shift_std_error_m: 0.0,
             n,
             n_effective: 200.0,
             n_effective_temporal: 1.0,

@@ -23,10 +23,16 @@ impl Scan<'_> {
         };
         let shift = self.shift_to(&plane);
         let cells = 0..self.cut.len();
-        let sums: Vec<Sums> = cells.map(|cell| self.sums_of(cell, &plane, &shift)).collect();
-        let correlation = self.correlation(first, &plane, &sums);
+        let mut sums: Vec<Sums> = cells.map(|cell| self.sums_of(cell, &plane, &shift)).collect();
+        // About its own plane: the tremble of a frame's tilt is no correlation between pixels.
+        let own = match self.bench.options.planes {
+            Planes::PerView => None,
+            Planes::PerFrame => self.own_plane(first, &vec![0.0; self.cut.len()]),
+        };
+        let correlation = self.correlation(first, &own.unwrap_or(plane), &sums);
         let temporal_correlation = self.lagged.correlation();
         let context = self.context(&correlation, temporal_correlation);
+        sums.iter_mut().for_each(|s| s.shared = context.shared_by_a_frame(s));
         let (cells, trusted, mut notes) = trusted_cells(&sums, &context);
         notes.extend(self.follow.drift_sigmas().map(|sigmas| {
             let way = if sigmas > 0.0 { "farther away" } else { "nearer" };

@@ -170,10 +170,7 @@ impl<'a> Scan<'a> {
     pub fn add(&mut self, frame: &Frame) -> bool {
         let Some(shifts) = self.shifts(frame) else { return false };
         match self.bench.options.planes {
-            Planes::PerView => {
-                self.own_planes += self.plane.q;
-                self.accumulate(frame, None, &shifts);
-            }
+            Planes::PerView => self.accumulate(frame, None, &shifts),
             Planes::PerFrame => {
                 let own = self.own_plane(frame, &shifts).unwrap_or(self.plane);
                 self.own_planes += own.q;
@@ -227,7 +224,7 @@ impl<'a> Scan<'a> {
     }
 
     /// Plane of this frame alone: least squares in inverse depth on the residuals within the cut.
-    fn own_plane(&self, frame: &Frame, shifts: &[f32]) -> Option<Plane> {
+    pub(super) fn own_plane(&self, frame: &Frame, shifts: &[f32]) -> Option<Plane> {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
         for (cell, &shift) in shifts.iter().enumerate() {

@@ -14,9 +14,12 @@ pub struct Rows {
     rows: Vec<SigmaRow>,
     /// Range of rows of each view.
     blocks: Vec<std::ops::Range<usize>>,
-    /// Sampling variance of the relative error; one for all rows when any n is unknown.
+    /// Sampling variance of the relative error. When any n is unknown, it is the same for all rows: one, or next to
+    /// nothing where views have several rows, whose scatter tells the rest.
     sampling: Vec<f64>,
+    /// Whether every n is known, and whether the variances are known in size and not only in proportion.
     counted: bool,
+    sized: bool,
     /// Sigma that residuals are relative to, m.
     reference: Vec<f64>,
     steepest: f64,
@@ -38,6 +41,9 @@ struct Whitener {
     shared: Vec<(std::ops::Range<usize>, f64)>,
 }
 
+/// Sampling variance of a row whose n is unknown beside others of its view: a ten-thousandth of sigma.
+const UNSEEN: f64 = 1e-8;
+
 impl Rows {
     pub fn new(table: &SigmaTable) -> Self {
         let mut rows = table.rows.clone();
@@ -50,9 +56,11 @@ impl Rows {
             }
         }
         let counted = rows.iter().all(|r| r.n_effective.is_some());
+        let sized = counted || blocks.len() < rows.len();
+        let unknown = if sized { UNSEEN } else { 1.0 };
         let sampling = rows
             .iter()
-            .map(|r| r.n_effective.filter(|_| counted).map_or(1.0, |n| 0.5 / n))
+            .map(|r| r.n_effective.filter(|_| counted).map_or(unknown, |n| 0.5 / n))
             .collect();
         let reference = rows.iter().map(|r| r.sigma_m).collect();
         let steepest = rows.iter().map(|r| r.theta_rad).fold(f64::NEG_INFINITY, f64::max);
@@ -61,6 +69,7 @@ impl Rows {
             blocks,
             sampling,
             counted,
+            sized,
             reference,
             steepest,
             tau_cell2: 0.0,
@@ -96,6 +105,11 @@ impl Rows {
         self.counted
     }
 
+    /// Whether the rows' variances are known in size.
+    pub fn sized(&self) -> bool {
+        self.sized
+    }
+
     /// Number of distances that differ by more than `ratio`.
     pub fn distances(&self, ratio: f64) -> usize {
         let mut z: Vec<f64> = self.rows.iter().map(|r| r.z_m).collect();
@@ -114,11 +128,11 @@ impl Rows {
         &self.reference
     }
 
-    /// Weighted chi-square per degree of freedom, for six parameters; at least 1 where the sampling error is
-    /// known.
+    /// Weighted chi-square per degree of freedom, for six parameters; at least 1 where the variances are known
+    /// in size.
     pub fn noise_scale(&self, chi2: f64) -> f64 {
         let found = chi2 / (self.len() as f64 - 6.0).max(1.0);
-        found.max(if self.counted { 1.0 } else { f64::MIN_POSITIVE })
+        found.max(if self.sized { 1.0 } else { f64::MIN_POSITIVE })
     }
 
     /// Divides by the reference sigma and transforms so that errors are independent and of unit variance: for
@@ -201,7 +215,7 @@ impl Rows {
     /// Estimates the two extra variances from the relative residuals (Paule and Mandel 1982, within views
     /// and between them); zero where sampling explains all.
     pub fn estimate_extra(&mut self, parameters: usize) {
-        if !self.counted {
+        if !self.sized {
             return;
         }
         let residual: Vec<f64> =

@@ -97,7 +97,7 @@ pub(super) fn report(
 ) -> SigmaFit {
     let spec = form.spec();
     let quality = Quality::of(rows, rows.reference());
-    let scale = if rows.counted() {
+    let scale = if rows.sized() {
         1.0
     } else {
         let n = rows.len() as f64;
