@@ -124,6 +124,14 @@ impl Finding {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
     }
 
+    /// Whether `correct` takes it out of depth images: a bias of the sensor, a law of the distance, or the steps of
+    /// columns.
+    pub fn is_corrected(&self) -> bool {
+        let steps = self.effect == Some("column-banding") && !self.parameters.is_empty();
+        let law = self.is_law() && self.contradicted.is_none();
+        self.terms.iter().any(Term::is_sensor_bias) || law || steps
+    }
+
     /// Text on how many views have it, where not all do.
     pub fn which_views(&self) -> Option<String> {
         self.of_some.map(in_some_views)
@@ -227,7 +235,7 @@ pub struct HeldOut {
     pub log_score_before: f64,
     pub log_score_after: f64,
     pub gain: f64,
-    /// 95 %, by resampling views.
+    /// 95 %, by the scatter of the views.
     pub gain_interval: [f64; 2],
     /// The same of the mean error alone: `correct` is worth while where it lies above zero.
     pub bias_gain_interval: [f64; 2],

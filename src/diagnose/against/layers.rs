@@ -81,7 +81,8 @@ impl Baseline {
         for (view, (ours, theirs)) in survey.views.iter_mut().zip(ours.iter().zip(&theirs)) {
             let (w, t) = (mean(ours), mean(theirs));
             if w > 0.0 && t > 0.0 {
-                let clumps = scatter(ours).max(scatter(theirs));
+                // What is compared scatters by the errors of both.
+                let clumps = scatter(ours, t / (w + t)).max(scatter(theirs, 1.0));
                 view.log_variance_inflation *= clumps * (w + t) / t;
             }
         }
@@ -89,13 +90,13 @@ impl Baseline {
 }
 
 /// Scatter of a view's blocks about a plane in the picture relative to Gaussian noise, as a ratio of
-/// variances of at least 1.
-fn scatter(view: &ViewData) -> f64 {
+/// variances of at least 1. The blocks' weights times `share` are their true ones.
+fn scatter(view: &ViewData, share: f64) -> f64 {
     let n = view.places.len();
     if n < 6 {
         return 1.0;
     }
-    let root: Vec<f64> = view.weight.iter().map(|w| w.sqrt()).collect();
+    let root: Vec<f64> = view.weight.iter().map(|w| (share * w).sqrt()).collect();
     let x = nalgebra::DMatrix::from_fn(n, 3, |i, k| {
         root[i] * [1.0, view.places[i].x, view.places[i].y][k]
     });

@@ -9,6 +9,7 @@ use crate::diagnose::joint::anchor::Family;
 use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::null::Null;
 use crate::solve::Cholesky;
+use crate::stats::student_quantile;
 use crate::terms::Axis;
 
 /// A law of distance error.
@@ -154,10 +155,12 @@ pub fn laws(checked: &[ReferencedView], bent_m: f64, open: &[Family]) -> Vec<Law
         let warm = |c: &ReferencedView| c.without_law() * (1.0 - (-c.session_s / tau).exp());
         references.law("thermal-drift", Axis::SessionTime, warm)
     }));
-    // Wider from here on: a variance estimated with few degrees of freedom makes a Student's t of a Gaussian.
+    // A variance estimated with few degrees of freedom makes a Student's t of a Gaussian: errors are stated so that
+    // the usual multiples of them hold 90 %.
     let Scatter { variances, freedom } = &mut references.scatter;
-    let wider = *freedom / (*freedom - 2.0).max(1.0);
-    variances.iter_mut().for_each(|v| *v *= wider);
+    let wider = student_quantile(0.9, *freedom) / student_quantile(0.9, f64::INFINITY);
+    laws.iter_mut().for_each(|law| law.estimate[1] *= wider);
+    variances.iter_mut().for_each(|v| *v *= wider * wider);
     let session_s = checked.iter().map(|r| r.session_s).fold(0.0, f64::max);
     if let Some(warm_up) = warm_up(session_s, |moves| references.evidence(Some(moves))) {
         for law in laws.iter_mut().filter(|l| l.family == "thermal-drift") {

@@ -208,7 +208,9 @@ fn binned(points: &[Point], axis: Axis, span: [f64; 2], model: impl Fn(f64) -> f
             continue;
         }
         let (x, y) = (mean(&members, |p| p.x), mean(&members, |p| p.share));
-        let scatter: f64 = members.iter().map(|p| (p.asked * (p.share - y)).powi(2)).sum();
+        let n = members.len() as f64;
+        let squares: f64 = members.iter().map(|p| (p.asked * (p.share - y)).powi(2)).sum();
+        let scatter = squares * n / (n - 1.0).max(1.0);
         curve.x.push(x);
         curve.y.push(y);
         curve.y_std_error.push((scatter / asked.powi(2)).max(y * (1.0 - y) / asked).sqrt());

@@ -212,7 +212,9 @@ impl<'a> Losses<'a> {
         let careful = Losses { left, whiteners, ..*self }.scattered_as_left_by(won, USUAL);
         let best = |steps: &[Step]| careful.judge(steps, &[], None).0.into_iter().next();
         let (always, later) = (best(&[always])?, best(&begun(&[always], times(self.views)))?);
-        (later.gain > always.gain + CLEARLY).then_some(later)
+        // In the scatter that its rivals were judged with.
+        let gain = won.gain + later.gain - always.gain;
+        (later.gain > always.gain + CLEARLY).then_some(Judged { gain, ..later })
     }
 
     fn evidence(&self, basis: &Basis) -> Vec<Evidence> {

@@ -204,8 +204,10 @@ impl Case<'_> {
     /// Variance inflation of each view's mean by a pattern that all views share.
     pub fn excess_of_pattern(&self, structure: &[Structure]) -> Vec<f64> {
         let (px2, n) = (fixed_px2(structure), structure.len() as f64);
-        let views = structure.iter().zip(&self.survey.views);
-        views.map(|(s, v)| s.excess_of_pattern(px2, v.frames, n, &v.correlation)).collect()
+        let views = structure.iter().zip(&self.survey.views).zip(&self.fields);
+        views
+            .map(|((s, v), f)| s.excess_of_pattern(px2, f.frames.len() as f64, n, &v.correlation))
+            .collect()
     }
 
     /// Whether tails can be measured against this term. A refit that makes sigma much smaller somewhere rests

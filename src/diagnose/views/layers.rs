@@ -218,10 +218,19 @@ impl Survey {
             if n < 2 {
                 continue;
             }
-            let mean = of_any_two_frames(common, n).clamp(0.0, 0.9);
-            view.between_frame_factor =
-                (mean < 0.9).then(|| n as f64 / (n as f64 - 1.0) / (1.0 - mean));
-            view.frames = view.frames.min(n as f64 - 1.0);
+            let (mean, all) = (of_any_two_frames(common, n), n as f64);
+            if mean >= 0.9 {
+                view.between_frame_factor = None;
+                view.frames = view.frames.min(all - 1.0);
+                continue;
+            }
+            view.between_frame_factor = Some(all / (all - 1.0) / (1.0 - mean.max(0.0)));
+            // What stands still takes no part; what fades repeats itself.
+            let [first, second, last] = common;
+            let fading = [first, second].map(|c| (c - last) / (1.0 - last).max(0.1));
+            let squares =
+                (1..).zip(fading).map(|(lag, c)| c * c * (1.0 - f64::from(lag) / all).max(0.0));
+            view.frames = (all - 1.0) / (1.0 + 2.0 * squares.sum::<f64>());
         }
     }
 
