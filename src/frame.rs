@@ -56,7 +56,8 @@ impl DepthCode {
     pub fn metres(&self, raw: u16) -> Option<f64> {
         let z = match *self {
             DepthCode::Metric { units_per_metre, invalid } => {
-                if raw == invalid || raw == 0 {
+                // Zero, and a word of ones, are no measurement in any format of lengths.
+                if raw == invalid || raw == 0 || raw == u16::MAX {
                     return None;
                 }
                 f64::from(raw) / units_per_metre
@@ -171,6 +172,13 @@ impl DepthTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn neither_end_of_the_words_is_a_length() {
+        let code = DepthCode::Metric { units_per_metre: 1000.0, invalid: 0 };
+        assert_eq!([0, u16::MAX].map(|raw| code.metres(raw)), [None; 2]);
+        assert_eq!(code.metres(u16::MAX - 1), Some(65.534));
+    }
 
     const KINECT: DepthCode =
         DepthCode::Disparity { offset: 3.3309495161, slope: -0.0030711016, invalid: 2047 };

@@ -59,6 +59,12 @@ impl Sensor {
         self.disparity_px_m().unwrap_or(self.camera.fx * KINECT_BASELINE_M)
     }
 
+    /// Whether its pictures are a Kinect v1's by kind and width.
+    pub fn may_be_kinect(&self) -> bool {
+        let light = self.kind.is_none_or(|kind| kind == SensorKind::StructuredLight);
+        light && self.camera.width == 640
+    }
+
     /// Whether it is not known to be a time-of-flight camera.
     pub fn may_have_disparity(&self) -> bool {
         self.kind.is_none_or(SensorKind::has_disparity)

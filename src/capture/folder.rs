@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::source::{Arrival, LiveFrame, Source};
 use crate::error::{Error, Result};
-use crate::io::{Assumed, describe_folder, entries, read_depth, size_of};
+use crate::io::{Assumed, by_number, describe_folder, entries, read_depth, size_of};
 use crate::view::{FrameRef, Sensor};
 
 /// Polling interval of the folder.
@@ -115,11 +115,14 @@ fn modified(path: &Path) -> SystemTime {
     std::fs::metadata(path).and_then(|m| m.modified()).unwrap_or(UNIX_EPOCH)
 }
 
-/// Depth images in name order.
+/// Depth images in name order, numbers by their value.
 fn images(root: &Path) -> Vec<PathBuf> {
     let inner = root.join("depth");
     let folder = if inner.is_dir() { &inner } else { root };
-    entries(folder).unwrap_or_default().into_iter().filter(|path| is_depth(path)).collect()
+    let mut images = entries(folder).unwrap_or_default();
+    images.retain(|path| is_depth(path));
+    images.sort_by_cached_key(|path| by_number(path));
+    images
 }
 
 fn is_depth(path: &Path) -> bool {

@@ -9,7 +9,7 @@ use super::layout::{
     DEPTH_LIST, DESCRIPTION, DESCRIPTIONS, INDEX, UnknownKeys, is_view, read_sensor,
 };
 use super::list::{FrameList, put_in_order, read_list, shorten};
-use super::output::{entries, listed};
+use super::output::{by_number, entries, listed};
 use super::stills::{Film, Footage};
 use crate::error::{Error, Result};
 use crate::read::{is_there, read_text};
@@ -71,10 +71,11 @@ pub(super) fn is_plain(root: &Path) -> Result<bool> {
     Ok(files.iter().any(|p| is_image(p)) && !files.iter().any(|p| is_view(p)))
 }
 
-/// 16-bit PNGs in name order; everything else comes from recording.json or from options.
+/// 16-bit PNGs in name order, numbers by their value; everything else comes from recording.json or from options.
 pub(super) fn images(root: &Path, assumed: &Assumed) -> Result<(Footage, Sensor)> {
     let mut files = entries(root)?;
     files.retain(|p| is_called_image(p));
+    files.sort_by_cached_key(|p| by_number(p));
     let odd = files.extract_if(.., |p| !p.is_file()).collect::<Vec<_>>();
     let odd = odd.iter().map(|p| format!("{} is not a regular file; left out", p.display()));
     let remarks: Vec<String> = odd.collect();

@@ -96,6 +96,12 @@ pub(super) fn read_any(frame: &FrameRef) -> Result<Frame> {
 
 fn decode(path: &Path, bytes: &[u8]) -> Result<Frame> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm")) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if !name.starts_with("d-") {
+            let what =
+                "a PGM that is not a fakenect dump's d-*.pgm, whose bytes are in another order";
+            return Err(Error::recording(path, what, "convert it to a 16-bit grey PNG"));
+        }
         decode_fakenect_pgm(path, bytes)
     } else {
         decode_png16(path, bytes)

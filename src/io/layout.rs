@@ -148,6 +148,11 @@ pub(super) fn open(root: &Path) -> Result<Recording> {
             // A folder that cannot be read may be a view.
             if let (true, Err(e)) = (folder.is_dir(), std::fs::read_dir(&folder)) {
                 recording.excluded.push(Excluded::of(&name, &Error::read(&folder, e)));
+            } else if folder.join("depth").is_dir() {
+                let what = "it has a folder depth, but no depth.txt";
+                let error =
+                    Error::recording(&folder, what, "list its images with their times there");
+                recording.excluded.push(Excluded::of(&name, &error));
             }
             continue;
         }

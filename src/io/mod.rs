@@ -21,7 +21,7 @@ pub(crate) use layout::{DEPTH_LIST, DESCRIPTIONS, INDEX, read_description};
 pub use layout::{DESCRIPTION, ViewFile, write_recording_file, write_view_notes};
 pub(crate) use list::content_lines;
 pub use list::{FrameList, read_list};
-pub(crate) use output::{entries, sync_folder, write_atomic_with};
+pub(crate) use output::{by_number, entries, sync_folder, write_atomic_with};
 pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub use output_folder::{Leaves, OutputFolder, refuse_inside, refuse_nested, settled};
 pub use pictures::{ColourImage, InfraredImage};
@@ -35,7 +35,6 @@ use raw_values::RawValues;
 use stills::Footage;
 
 use crate::error::{Error, Result};
-use crate::frame::DepthCode;
 use crate::read::is_there;
 use crate::view::{FrameRef, Recording, Sensor};
 
@@ -133,22 +132,22 @@ fn open_and_cut(path: &Path, assumed: &Assumed, cut: bool) -> Result<Recording> 
         ));
     }
     let frames: Vec<&FrameRef> = recording.views.iter().flat_map(|v| &v.depth).collect();
-    let doubt = refuse_impossible(path, recording.sensor.code, &frames)?;
+    let doubt = refuse_impossible(path, &recording.sensor, &frames)?;
     recording.remarks.extend(doubt);
     Ok(recording)
 }
 
-/// Checks that the raw values in some of these frames can be what `code` says.
+/// Checks that the raw values in some of these frames can be what the sensor's code says.
 /// Fails if they cannot; returns a remark if it is doubtful.
 pub(crate) fn refuse_impossible(
     root: &Path,
-    code: DepthCode,
+    sensor: &Sensor,
     frames: &[&FrameRef],
 ) -> Result<Option<String>> {
     let values = RawValues::of(frames.iter().copied());
-    match values.contradiction(code) {
+    match values.contradiction(sensor.code) {
         Some((what, remedy)) => Err(Error::recording(root, what, remedy)),
-        None => Ok(values.doubt(code)),
+        None => Ok(values.doubt(sensor.code, sensor.may_be_kinect())),
     }
 }
 
@@ -169,6 +168,6 @@ pub(crate) fn describe_folder(
         _ => assumed.images_sensor(root, images)?,
     };
     let frames: Vec<&FrameRef> = images.iter().collect();
-    let doubt = refuse_impossible(root, sensor.code, &frames)?;
+    let doubt = refuse_impossible(root, &sensor, &frames)?;
     Ok((sensor, remark.into_iter().chain(doubt).collect()))
 }

@@ -102,6 +102,25 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
+/// Key that sorts names with their numbers by value: 2.png before 10.png.
+pub(crate) fn by_number(path: &Path) -> String {
+    const DIGITS: usize = 20;
+    let (mut key, mut digits) = (String::new(), String::new());
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    for c in name.chars().map(Some).chain([None]) {
+        if let Some(digit) = c.filter(char::is_ascii_digit) {
+            digits.push(digit);
+            continue;
+        }
+        if !digits.is_empty() {
+            key += &format!("{digits:0>DIGITS$}");
+            digits.clear();
+        }
+        key.extend(c);
+    }
+    key
+}
+
 /// The first few names, and how many more there are.
 pub(crate) fn listed(names: &[String]) -> String {
     const SHOWN: usize = 3;
@@ -124,6 +143,13 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_sort_by_value() {
+        let mut names = ["10.png", "2.png", "a10b1.png", "a9b20.png", "1.png", "0010b.png"];
+        names.sort_by_key(|name| by_number(Path::new(name)));
+        assert_eq!(names, ["1.png", "2.png", "10.png", "0010b.png", "a9b20.png", "a10b1.png"]);
+    }
 
     #[test]
     fn a_failed_write_leaves_no_temporary_file() {

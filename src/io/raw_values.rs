@@ -112,14 +112,15 @@ impl RawValues {
         (high - low < MAX_SPREAD * middle).then_some(KINECT_STEP / middle)
     }
 
-    /// The usual unit that the steps indicate.
-    fn stepped_unit(&self) -> Option<f64> {
-        let units = self.kinect_units()?;
+    /// The usual unit that the steps indicate, of a sensor that may be a Kinect. Other sensors' steps in one unit look
+    /// like a Kinect's in another.
+    fn stepped_unit(&self, may_be_kinect: bool) -> Option<f64> {
+        let units = self.kinect_units().filter(|_| may_be_kinect)?;
         USUAL_UNITS.into_iter().find(|usual| (units / usual - 1.0).abs() < SAME_UNIT)
     }
 
     /// The only code that explains the values, and why; or what they leave open.
-    pub fn code(&self) -> Result<(DepthCode, String), String> {
+    pub fn code(&self, may_be_kinect: bool) -> Result<(DepthCode, String), String> {
         let metric = |units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 };
         if self.are_disparities() {
             let why = "2047 marks missing pixels and no depth is above 1092: raw Kinect disparities, \
@@ -129,7 +130,7 @@ impl RawValues {
         let Some([first, last]) = self.ends() else {
             return Err("no image shows a depth, so that nothing tells its unit".into());
         };
-        if let Some(units) = self.stepped_unit() {
+        if let Some(units) = self.stepped_unit(may_be_kinect) {
             let named = if units == USUAL_UNITS[0] { "millimetres" } else { "5000 a metre" };
             let why = format!("depth steps as a Kinect's does in {named}: taken as that");
             return Ok((metric(units), why));
@@ -193,10 +194,11 @@ impl RawValues {
     }
 
     /// Why these values are probably not in `code`.
-    pub fn doubt(&self, code: DepthCode) -> Option<String> {
+    pub fn doubt(&self, code: DepthCode, may_be_kinect: bool) -> Option<String> {
         let DepthCode::Metric { units_per_metre: given, .. } = code else { return None };
         // A unit a few percent off is a scale error, which a diagnosis identifies.
-        let other = self.stepped_unit().filter(|unit| !(0.5..2.0).contains(&(unit / given)));
+        let stepped = self.stepped_unit(may_be_kinect);
+        let other = stepped.filter(|unit| !(0.5..2.0).contains(&(unit / given)));
         let shown = shortest(given);
         if let Some(unit) = other {
             return Some(format!(
@@ -237,7 +239,7 @@ mod tests {
     }
 
     fn units(values: &RawValues) -> Option<f64> {
-        match values.code().ok()?.0 {
+        match values.code(true).ok()?.0 {
             DepthCode::Metric { units_per_metre, .. } => Some(units_per_metre),
             DepthCode::Disparity { .. } => None,
         }
@@ -250,9 +252,11 @@ mod tests {
             assert_eq!(units(&seen), Some(unit), "{:?}", seen.kinect_units());
             let other = if unit == 1000.0 { 5000.0 } else { 1000.0 };
             let code = |units_per_metre| DepthCode::Metric { units_per_metre, invalid: 0 };
-            assert!(seen.doubt(code(other)).is_some_and(|d| d.contains("steps as a Kinect's")));
-            assert_eq!(seen.doubt(code(unit)), None);
-            assert_eq!(seen.doubt(code(1.035 * unit)), None, "a scale");
+            assert!(
+                seen.doubt(code(other), true).is_some_and(|d| d.contains("steps as a Kinect's"))
+            );
+            assert_eq!(seen.doubt(code(unit), true), None);
+            assert_eq!(seen.doubt(code(1.035 * unit), true), None, "a scale");
         }
     }
 
@@ -260,18 +264,22 @@ mod tests {
     #[test]
     fn another_lattice_decides_nothing() {
         let mut seen = values(&[2.0, 3.0, 4.0, 6.0], 1000.0, true);
-        assert_eq!(seen.stepped_unit(), Some(1000.0));
+        assert_eq!(seen.stepped_unit(true), Some(1000.0));
         seen = values(&[4.0, 6.0, 8.0], 1000.0 * 5.58, true);
-        assert_eq!(seen.stepped_unit(), None, "{:?}", seen.kinect_units());
+        assert_eq!(seen.stepped_unit(true), None, "{:?}", seen.kinect_units());
+        // A D415's, of 1/32 px with 0.055 m and 1004.6 px, are like a Kinect's at 5000 a metre.
+        seen = values(&[2.0, 3.0, 4.0, 6.0], 5000.0, true);
+        assert_eq!(seen.stepped_unit(false), None);
+        assert!(seen.code(false).is_err());
     }
 
     #[test]
     fn range_tells_millimetres_and_nothing_else() {
         assert_eq!(units(&values(&[1.0, 2.0, 4.0], 1000.0, false)), Some(1000.0));
-        let open = values(&[2.0, 4.0], 1000.0, false).code().unwrap_err();
+        let open = values(&[2.0, 4.0], 1000.0, false).code(true).unwrap_err();
         assert!(open.contains("1.70 to 4.60 m in millimetres, 0.34 to 0.92 m at 5000"), "{open}");
-        assert!(values(&[1.0, 2.0], 5000.0, false).code().is_err());
-        let low = values(&[0.6, 0.7], 1000.0, false).code().unwrap_err();
+        assert!(values(&[1.0, 2.0], 5000.0, false).code(true).is_err());
+        let low = values(&[0.6, 0.7], 1000.0, false).code(true).unwrap_err();
         assert!(low.contains("raw disparities"), "{low}");
     }
 
@@ -282,7 +290,7 @@ mod tests {
         assert!(seen.contradiction(lengths).is_none());
         assert!(seen.contradiction(OPENKINECT).is_none());
         seen.counts[NO_DISPARITY] = 2000;
-        assert_eq!(seen.code().map(|c| c.0), Ok(OPENKINECT));
+        assert_eq!(seen.code(true).map(|c| c.0), Ok(OPENKINECT));
         let (what, remedy) = seen.contradiction(lengths).unwrap();
         assert!(what.contains("2047") && remedy.contains("--raw-disparity"), "{what}");
         // A value above the pole is a depth in millimetres, and then so is 2047.

@@ -100,12 +100,19 @@ fn cut_up(frames: Vec<FrameRef>, film: Film, sensor: &Sensor) -> (Vec<View>, Vec
     let listed = frames.len();
     let (stretches, blank) = stretches(frames, sensor);
     let readable: usize = stretches.iter().map(Vec::len).sum();
-    let shortest = film.shortest().min(stretches.iter().map(Vec::len).max().unwrap_or(0));
+    let longest = stretches.iter().map(Vec::len).max().unwrap_or(0);
+    let shortest = film.shortest().min(longest);
     let long = stretches.into_iter().filter(|stretch| stretch.len() >= shortest);
     let views: Vec<View> =
         long.enumerate().map(|(i, depth)| view(name(i, &depth, film), depth)).collect();
     let used: usize = views.iter().map(|v| v.depth.len()).sum();
     let mut remarks = Vec::new();
+    if (1..film.shortest()).contains(&longest) {
+        remarks.push(format!(
+            "no stretch is still for {} frames, the longest for {longest}: target or sensor may be moving; hold still for a second at every pose",
+            film.shortest()
+        ));
+    }
     if let Some((first, others)) = blank.split_first() {
         remarks.push(format!(
             "{} of {listed} frames cannot be read or carry no depth; the first: {first}",

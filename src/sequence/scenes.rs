@@ -67,7 +67,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     }
     let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
     let frames: Vec<&FrameRef> = moments.iter().map(|m| &m.depth).collect();
-    remarks.extend(refuse_impossible(root, sensor.code, &frames)?);
+    remarks.extend(refuse_impossible(root, &sensor, &frames)?);
     Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, unused_truth: None, remarks })
 }
 

@@ -111,7 +111,7 @@ proptest! {
     fn depth_images(frame in frame()) {
         let folder = folder();
         let (png, quick, pgm) = (encode_png16(&frame), encode_png16_quickly(&frame), encode_pgm16(&frame));
-        for (name, bytes) in [("a.png", png.unwrap()), ("b.png", quick.unwrap()), ("c.pgm", pgm)] {
+        for (name, bytes) in [("a.png", png.unwrap()), ("b.png", quick.unwrap()), ("d-1.000000-1.pgm", pgm)] {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
             prop_assert_eq!(&FrameSource::new(frame.width, frame.height).read(&path).unwrap(), &frame);

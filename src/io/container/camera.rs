@@ -58,11 +58,9 @@ fn beside(topics: &[Topic], depth: &str) -> Option<usize> {
     };
     let is_there = |t: &Topic| {
         let below = |parent: &str| t.name.strip_prefix(parent).and_then(|r| r.strip_prefix('/'));
-        // Every topic lies in the root's namespace: there only its own belong to the images.
-        let inside = match namespace {
-            "" => below("").is_some_and(|rest| !rest.contains('/')) || below(depth).is_some(),
-            _ => below(namespace).is_some(),
-        };
+        // Further down may be other cameras. librealsense's recorder has a level of its own.
+        let beside = |rest: &str| !rest.contains('/') || rest == "info/camera_info";
+        let inside = below(namespace).is_some_and(beside) || below(depth).is_some();
         inside && t.kind == "sensor_msgs/CameraInfo" && !t.logged_ns.is_empty()
     };
     let mut found = topics.iter().enumerate().filter(|(_, t)| is_there(t));

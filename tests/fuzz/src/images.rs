@@ -95,7 +95,7 @@ pub fn dump(data: &[u8]) -> bool {
         let mut source = FrameSource::new(camera.width, camera.height);
         let first = source.frame(&recording.views[0].depth[0]).expect("its size was read");
         if !is_index {
-            let path = desk.put("again.pgm", &encode_pgm16(&first));
+            let path = desk.put("d-again.pgm", &encode_pgm16(&first));
             assert_eq!(source.read(&path).expect("what was written is read"), first);
         }
         true
