@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         folder: &arguments.output,
         input: &held.input,
     };
-    after.reproductions(arguments.model.as_deref()).iter().for_each(say);
+    after.reproductions(arguments.model.as_deref(), &model.effects).iter().for_each(say);
     after.steps().iter().take(1).for_each(|step| next_step(&step.words));
     let found = diagnosis.verdict == Verdict::Mismatch && !arguments.exit_zero;
     Ok(if found { FOUND } else { 0 })
@@ -133,9 +133,7 @@ pub fn examine(
     working("drawing the page", |_| -> anyhow::Result<()> {
         let pictures = with_twins(&done, &recording.sensor, model, options.seed);
         let origin = &origin(&recording.root, options.seed.0);
-        // The page gives the folder's name, not its path.
-        let folder = PathBuf::from(out.place().file_name().unwrap_or_default());
-        let after = After { diagnosis, recording: &recording.root, folder: &folder, input };
+        let after = After { diagnosis, recording: &recording.root, folder: out.place(), input };
         let steps: Vec<Step> = after.steps().iter().map(NextStep::on_page).collect();
         let page =
             DiagnosisPage { title: &title, diagnosis, pictures: &pictures, steps: &steps, origin };

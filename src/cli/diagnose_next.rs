@@ -4,6 +4,8 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use kinoise::diagnose::{Diagnosis, Finding, Reference, Status, Verdict};
+use kinoise::effects::Active;
+use kinoise::model;
 use kinoise::report::{Step, called};
 
 use super::common::model_again;
@@ -69,20 +71,26 @@ impl After<'_> {
         steps
     }
 
-    /// Whether there is a bias to correct that held-out views do not contradict.
+    /// Whether there is a bias to correct that held-out views do not contradict, or a law of the distance, which
+    /// these do not show.
     fn corrects(&self) -> bool {
+        let law = |f: &Finding| f.is_law() && f.status == Status::Named && f.contradicted.is_none();
         let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
         let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.bias_gain_interval[0] > 0.0);
-        gains && self.diagnosis.findings.iter().any(biased)
+        let findings = &self.diagnosis.findings;
+        gains && findings.iter().any(biased) || findings.iter().any(law)
     }
 
-    /// Commands that simulate each finding with `--effect`, starting from the model that was `given`; and why
-    /// the other findings have none.
-    pub fn reproductions(&self, given: Option<&Path>) -> Vec<String> {
+    /// Commands that simulate each finding with `--effect`, starting from the model that was `given`, whose effects
+    /// are `known`; and why the other findings have none.
+    pub fn reproductions(&self, given: Option<&Path>, known: &[model::Effect]) -> Vec<String> {
         let mut commands = Vec::new();
         let mut others = Vec::new();
         for finding in &self.diagnosis.findings {
-            let Some(effect) = finding.as_effect().filter(|e| !e.is_identity()) else {
+            // The simulator takes an effect from one place.
+            let fresh = |e: &Active| known.iter().all(|k| k.id != e.effect.card().id);
+            let effect = finding.as_effect().filter(|e| !e.is_identity() && fresh(e));
+            let Some(effect) = effect else {
                 others.extend((!finding.minor).then_some(finding));
                 continue;
             };
@@ -106,7 +114,10 @@ impl After<'_> {
         };
         let model = self.folder.join("model.json");
         let brought = format!("measured, and simulated with -m {}", shell(&[model.into()]));
-        let parts = [(names(true), &*brought), (names(false), "of a strength that is not known")];
+        let parts = [
+            (names(true), &*brought),
+            (names(false), "which the model has, or of a strength that is not known"),
+        ];
         let parts = parts.iter().filter(|(names, _)| !names.is_empty());
         let parts: Vec<String> = parts.map(|(names, what)| format!("{names} ({what})")).collect();
         (!parts.is_empty()).then(|| format!("  no --effect stands for {}", parts.join(" and ")))

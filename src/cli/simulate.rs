@@ -166,7 +166,8 @@ fn shoot(
     let sensor = recorded_by.unwrap_or(sensor);
     if let Physics::Formula { sigma, effects } = &physics {
         note_clamped(&views, sigma);
-        note_idle(effects, &arguments.scenery, arguments.like.is_some());
+        let frames = views.iter().map(|v| v.stamps.len()).max().unwrap_or(0);
+        note_idle(effects, &arguments.scenery, arguments.like.is_some(), frames);
     }
     detail(format!("effects and physics: {physics:?}"));
     let shoot = Shoot { sensor, views, physics, infrared: arguments.infrared, seed: global.seed() };

@@ -101,13 +101,16 @@ impl SceneryArguments {
 }
 
 /// Notes effects that have nothing to act on in this scene.
-pub fn note_idle(effects: &[Active], scenery: &SceneryArguments, like: bool) {
+pub fn note_idle(effects: &[Active], scenery: &SceneryArguments, like: bool, frames: usize) {
     for active in effects {
         let (id, bare) = (active.effect.card().id, scenery.wall.is_none());
         let (missing, option) = match id {
             "occlusion-shadow" | "edge-mixing" if bare => ("something behind the target", "--wall"),
             "intensity-dependent-noise" if !scenery.patches => {
                 ("a target of several greys", "--patches")
+            }
+            "target-motion" | "temporal-correlation" | "frame-jitter" if frames < 2 => {
+                ("several frames a view", "--frames")
             }
             _ => continue,
         };

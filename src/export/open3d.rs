@@ -1,6 +1,6 @@
 //! The distortion table of Open3D's `DepthNoiseSimulator` and of Redwood's simdepth.py.
 //!
-//! Layout: five skipped lines, then 80 x 80 rows (8 x 6 px each, row by row) of 23 numbers: three that
+//! Layout: five skipped lines, then a number a line: for 80 x 80 blocks (8 x 6 px each, row by row) 23, three that
 //! describe the bins, then counts, two sums and the factors of five bins of 2 m. The reader divides a true
 //! depth by the factor, interpolated linearly between the bin centres at 1, 3, 5, 7 and 9 m
 //! (cpp/open3d/t/io/ImageIO.cpp; <http://redwood-data.org/indoor/data/simdepth.py>).
@@ -42,7 +42,7 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
     let mut text = String::from(
         "% A distortion model for Open3D's DepthNoiseSimulator, written by kinoise\n\
          % max_dist num_bins bin_depth counts[5] numerators[5] denominators[5] multipliers[5]\n\
-         % a row a block of 8 x 6 px, row by row\n%\n%\n",
+         % 23 numbers a block of 8 x 6 px, row by row, a number a line\n%\n%\n",
     );
     for y in 0..BLOCKS {
         for x in 0..BLOCKS {
@@ -52,11 +52,10 @@ pub(super) fn write(model: &NoiseModel) -> Result<Exported> {
             let examples = vec![EXAMPLES; BINS];
             // Sums over examples of truth squared and of truth times measurement: only their ratio matters.
             let sums = factors.iter().map(|f| EXAMPLES * f).collect();
-            let _ = write!(text, "10 {BINS} {BIN_M}");
+            let _ = writeln!(text, "10\n{BINS}\n{BIN_M}");
             for number in [examples.clone(), sums, examples, factors].concat() {
-                let _ = write!(text, " {}", number as f32);
+                let _ = writeln!(text, "{}", number as f32);
             }
-            text.push('\n');
         }
     }
     let mut notes = notes_of_bias(&correction);

@@ -50,8 +50,25 @@ struct BlockGrid {
     focal: [f32; 2],
     centre: [f32; 2],
     distortion: Option<[f32; 5]>,
+    /// Largest squared ray of the image: beyond, a lens model may fold back into it.
+    reach: f32,
     width: usize,
     height: usize,
+}
+
+/// Margin on the squared rays of the pixels' centres, for the outer halves of the last ones.
+const BEYOND: f32 = 1.1;
+
+/// Largest squared ray of the image's border.
+fn largest_ray(camera: &Camera) -> f32 {
+    let (right, below) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
+    let rows = (0..camera.height).flat_map(|v| [(0.0, v as f64), (right, v as f64)]);
+    let columns = (0..camera.width).flat_map(|u| [(u as f64, 0.0), (u as f64, below)]);
+    let square = |(u, v): (f64, f64)| {
+        let (x, y) = camera.ray(u, v);
+        x * x + y * y
+    };
+    rows.chain(columns).map(square).fold(0.0, f64::max) as f32
 }
 
 impl BlockGrid {
@@ -62,6 +79,7 @@ impl BlockGrid {
             // Pixel centres are whole numbers.
             centre: [camera.cx, camera.cy].map(|c| ((c + 0.5) / side) as f32),
             distortion: camera.distortion.map(|k| k.map(|k| k as f32)),
+            reach: BEYOND * largest_ray(camera),
             width: camera.width / side_px,
             height: camera.height / side_px,
         }
@@ -75,6 +93,9 @@ impl BlockGrid {
         let near = 1.0 / p.z;
         let (mut x, mut y) = (p.x * near, p.y * near);
         if let Some(k) = &self.distortion {
+            if x * x + y * y > self.reach {
+                return None;
+            }
             let (dx, dy, radial) = lens(k, x, y);
             (x, y) = (x * radial + dx, y * radial + dy);
         }

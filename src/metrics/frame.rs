@@ -54,6 +54,7 @@ impl FrameMetrics {
         let rms = |squares: f64| (squares / kept.len() as f64).sqrt();
         let plane_fit_rms_m = rms(offs.iter().map(|off| off * off).sum());
         let (distance_m, axis_distance_m) = (fit.d.abs(), -fit.d / fit.n.z);
+        // By depth, as in the tool's help; its code takes ranges, which a wide view shows as less.
         let error_px = |scale: f64| {
             let one = |(p, off): (&Vector3<f64>, &f64)| {
                 (scale / p.z - scale / (p.z - off * fit.n.z)).powi(2)

@@ -7,7 +7,7 @@ use super::chart::{Chart, Stroke};
 use super::colours::{self, INK};
 use super::document::{Origin, beside, document, figure, list, prose, section, table};
 use super::numbers::{ABSENT, MM, fixed};
-use super::trajectories::{Line, chart};
+use super::trajectories::{AXES, Line, chart, longest_axes};
 use crate::compare::{Comparison, Row, Run, tables};
 use crate::error::Result;
 use crate::trajectory::Pose;
@@ -77,16 +77,18 @@ fn paths(comparison: &Comparison) -> Chart {
             first.is_some_and(|p| p.stamp <= stamp) && last.is_some_and(|p| p.stamp >= stamp)
         })
     };
-    let from_above = |p: &Vector3<f64>| [p.x, p.y];
     let truth = comparison.truth.iter().filter(|p| within(p.stamp));
-    let truth = truth.map(|p| from_above(&p.world_from_camera.translation.vector)).collect();
+    let truth: Vec<Vector3<f64>> = truth.map(|p| p.world_from_camera.translation.vector).collect();
+    let [i, j] = longest_axes(&truth);
+    let flat = |p: &Vector3<f64>| [p[i], p[j]];
+    let truth = truth.iter().map(flat).collect();
     let mut paths = vec![("ground truth".into(), truth, Stroke::new(INK, 1))];
     paths.extend(lines(comparison, |run| {
         let aligned = run.evaluation.ate.truth_from_estimate;
-        let place = |p: &Pose| from_above(&(aligned * p.world_from_camera).translation.vector);
+        let place = |p: &Pose| flat(&(aligned * p.world_from_camera).translation.vector);
         run.trajectory.iter().map(place).collect()
     }));
-    chart("Fig. 6. Paths from above, aligned", ["x (m)", "y (m)"], paths, true)
+    chart("Fig. 6. Paths, aligned", [AXES[i], AXES[j]], paths, true)
 }
 
 fn over_time(comparison: &Comparison, title: &str, of: fn(&Run) -> &Vec<(f64, f64)>) -> Chart {

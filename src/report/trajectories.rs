@@ -57,6 +57,20 @@ pub struct Against<'a> {
     pub delta: Delta,
 }
 
+pub(super) const AXES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
+
+/// The two axes along which a path is longest, in order.
+pub(super) fn longest_axes(path: &[Vector3<f64>]) -> [usize; 2] {
+    let length = |k: usize| {
+        let [low, high] = range(path.iter().map(|p| p[k]));
+        high - low
+    };
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|a, b| length(*b).total_cmp(&length(*a)));
+    axes[..2].sort_unstable();
+    [axes[0], axes[1]]
+}
+
 impl Against<'_> {
     /// The paths and both errors over time, each with its file name.
     pub fn charts(&self) -> [(&'static str, Chart); 3] {
@@ -84,12 +98,7 @@ impl Against<'_> {
         let aligned = self.evaluation.ate.truth_from_estimate;
         let place = |p: &Pose| p.world_from_camera.translation.vector;
         let truth: Vec<Vector3<f64>> = self.truth.iter().filter(within).map(place).collect();
-        let mut axes = [0, 1, 2];
-        let extent = |k: usize| range(truth.iter().map(|p| p[k]));
-        let length = |k: usize| extent(k)[1] - extent(k)[0];
-        axes.sort_by(|a, b| length(*b).total_cmp(&length(*a)));
-        axes[..2].sort_unstable();
-        let [i, j] = [axes[0], axes[1]];
+        let [i, j] = longest_axes(&truth);
         let flat = |p: Vector3<f64>| [p[i], p[j]];
         let estimate =
             self.estimate.iter().map(|p| flat((aligned * p.world_from_camera).translation.vector));
@@ -97,8 +106,7 @@ impl Against<'_> {
             ("ground truth".into(), truth.iter().map(|p| flat(*p)).collect(), Stroke::new(INK, 1)),
             ("estimate, aligned".into(), estimate.collect(), Stroke::new(ACCENT, 2)),
         ];
-        let names = ["x (m)", "y (m)", "z (m)"];
-        chart("Paths", [names[i], names[j]], lines, true)
+        chart("Paths", [AXES[i], AXES[j]], lines, true)
     }
 
     /// Error statistics as tiles and as a table, errors over time, and paths.

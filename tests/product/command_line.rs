@@ -138,8 +138,9 @@ fn a_plain_folder_is_read_alike_by_every_next_command() {
     assert!(correct.starts_with("kinoise correct ") && correct.ends_with(&options), "{correct}");
     let page = at("out-diagnosis/report.html");
     let page = std::fs::read_to_string(&page).expect(&page);
-    let shown = format!("kinoise correct {} -o out-diagnosis-corrected", at("plain"));
-    let shown = format!("{shown} -m out-diagnosis/model.json {options}");
+    let out = at("out-diagnosis");
+    let shown = format!("kinoise correct {} -o {out}-corrected", at("plain"));
+    let shown = format!("{shown} -m {out}/model.json {options}");
     assert!(page.contains(&shown), "the page and the terminal say the same: {shown}");
     let corrected = run_line(&correct);
     assert!(corrected.status.success(), "{}", stderr(&corrected));

@@ -261,13 +261,13 @@ fn open3d_finds_the_bias() {
         "
 import json, numpy as np
 data = np.loadtxt('model.txt', comments='%', skiprows=5)
-assert data.shape == (6400, 23), data.shape
+assert data.shape == (6400 * 23,), data.shape
 table = np.zeros((80, 80, 5))
 for y in range(80):
     for x in range(80):
-        row = data[y * 80 + x]
-        if not np.all(row[3:8] < 8000):
-            table[y, x] = row[18:23]
+        idx = (y * 80 + x) * 23 + 3
+        if not (data[idx:idx + 5] < 8000).all():
+            table[y, x] = data[idx + 15:idx + 20]
 def distort(u, v, d):
     i2 = int((d + 1) / 2)
     i1 = i2 - 1

@@ -99,7 +99,7 @@ pub(super) fn held_out(diagnosis: &Diagnosis) -> Markup {
             @if held.gain_interval[0] > 0.0 { "The extended model predicts such a view better by " }
             @else { "No gain beyond chance: the extended model differs by " }
             b { (gain) " nats a view" }
-            " (95 % interval " (low) " to " (high) ", by resampling views). "
+            " (95 % interval " (low) " to " (high) ", by the scatter of the views). "
             span.units { "A nat more makes what was recorded e ≈ 2.7 times as probable." }
         } }
     };

@@ -147,7 +147,8 @@ pub(super) fn statistic(statistic: Statistic) -> &'static str {
 
 /// An interval of an axis in everyday units.
 pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String {
-    if !(low.is_finite() && high.is_finite()) {
+    // Effects that were not measured along an axis have no place on it.
+    if !(low.is_finite() && high.is_finite()) || [low, high] == [0.0; 2] {
         return "over its whole range".into();
     }
     let other = format!(" {unit}");

@@ -39,23 +39,30 @@ pub(super) fn title(i: usize, finding: &Finding) -> String {
 
 fn line(i: usize, f: &Finding) -> Vec<Markup> {
     let name = capital(&called(f));
-    let size = match f.statistic {
-        Statistic::Dropout => format!("{} of pixels", percent(f.size.sigma)),
-        _ if f.size.mm.abs() > 0.0 => mm(f.size.mm),
-        _ => "–".into(),
-    };
+    let [size, sigmas] = sizes(f);
     let likely = f.alternatives.first().and_then(|a| a.probability);
     let place = interval(f.axis, f.interval, f.unit);
     row![
         html! { a href={ "#" (slug(&title(i, f))) } { (name) } },
         size,
-        html! { @if f.statistic == Statistic::Dropout { "–" } @else { (significant(f.size.sigma, 2)) } },
+        sigmas,
         html! { @if let Some(p) = likely { (percent(p)) } @else { "–" } },
         html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } },
         capital(statistic(f.statistic)),
         html! { (capital(axis(f.axis))) ": " (place) },
         prose(&short_advice(f)),
     ]
+}
+
+/// Size in mm and beside the noise; of lost pixels, their share.
+fn sizes(f: &Finding) -> [Markup; 2] {
+    let none = || html! { "–" };
+    let sigmas = html! { (significant(f.size.sigma, 2)) };
+    match f.statistic {
+        Statistic::Dropout => [html! { (percent(f.size.sigma)) " of pixels" }, none()],
+        _ if f.size.mm.abs() > 0.0 => [html! { (mm(f.size.mm)) }, sigmas],
+        _ => [none(), sigmas],
+    }
 }
 
 /// Whether the finding is an error of the target, which no correction removes.
@@ -71,9 +78,8 @@ fn short_advice(f: &Finding) -> String {
             format!("one more view: {} m, tilt {tilt}°", fixed(view.z_m, 2))
         }
         (Status::Named, _) if is_of_target(f) => "use a flatter target: the sensor is right".into(),
-        (Status::Named, _) if f.statistic == Statistic::Bias => {
-            "`kinoise correct` takes it out".into()
-        }
+        (Status::Named, _) if f.is_corrected() => "`kinoise correct` takes it out".into(),
+        (Status::Named, _) if f.effect == Some("target-motion") => "keep the target still".into(),
         (Status::Named, _) => "nothing: the extended model has it".into(),
         (Status::OneOf, None) if f.is_law() => "references near and far, from a cold start".into(),
         (Status::OneOf, None) => "views at other distances and tilts".into(),
@@ -98,10 +104,9 @@ fn small(minor: &[&Finding]) -> Markup {
     ];
     let row = |f: &&Finding| {
         let p = html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } };
-        let (size, share) = (mm(f.size.mm), format!("{} %", fixed(100.0 * f.share, 2)));
+        let ([size, sigmas], share) = (sizes(f), format!("{} %", fixed(100.0 * f.share, 2)));
         let (what, off) = (capital(&called(f)), capital(statistic(f.statistic)));
-        let (sigmas, along, halves) =
-            (significant(f.size.sigma, 2), axis(f.axis), halves(f.replicated));
+        let (along, halves) = (axis(f.axis), halves(f.replicated));
         row![what, size, sigmas, share, p, off, along, halves]
     };
     html! { @if !minor.is_empty() {

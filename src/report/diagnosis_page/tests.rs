@@ -2,7 +2,7 @@ use serde_json::{Map, Value, json};
 
 use super::*;
 use crate::diagnose::*;
-use crate::terms::{Axis, Basis, Statistic, Term};
+use crate::terms::{Axis, Basis, Coordinate, Modulation, Statistic, Term};
 
 fn map(value: Value) -> Map<String, Value> {
     value.as_object().cloned().unwrap()
@@ -48,6 +48,10 @@ fn bowl(status: Status, others: [(&'static str, f64); 2]) -> Finding {
     Finding {
         alternatives: alternatives.into(),
         parameters: map(json!({"k_px": {"value": 0.3123, "std_error": 0.0121}})),
+        terms: vec![Term::bias(
+            Basis::powers(Coordinate::RadiusSquared, 1, Modulation::One),
+            vec![0.3123],
+        )],
         physics: "a bent board would move with the board & not stay in the picture".into(),
         curve: curve("radius (px)", 398.0, |r| 0.31 * (r / 398.0).powi(2) - 0.1),
         ..finding(status, Some("radial-disparity-bias"))
