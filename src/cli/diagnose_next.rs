@@ -71,14 +71,14 @@ impl After<'_> {
         steps
     }
 
-    /// Whether there is a bias to correct that held-out views do not contradict, or a law of the distance, which
-    /// these do not show.
+    /// Whether there is a bias to correct that held-out views do not contradict, or one that their score does not
+    /// hold: a law of the distance, or steps of columns.
     fn corrects(&self) -> bool {
-        let law = |f: &Finding| f.is_law() && f.status == Status::Named && f.contradicted.is_none();
         let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
-        let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.bias_gain_interval[0] > 0.0);
+        let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.bias_is_clear);
         let findings = &self.diagnosis.findings;
-        gains && findings.iter().any(biased) || findings.iter().any(law)
+        let unscored = |f: &Finding| f.status == Status::Named && f.is_corrected() && !biased(f);
+        gains && findings.iter().any(biased) || findings.iter().any(unscored)
     }
 
     /// Commands that simulate each finding with `--effect`, starting from the model that was `given`, whose effects

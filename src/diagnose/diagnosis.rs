@@ -237,8 +237,11 @@ pub struct HeldOut {
     pub gain: f64,
     /// 95 %, by the scatter of the views.
     pub gain_interval: [f64; 2],
-    /// The same of the mean error alone: `correct` is worth while where it lies above zero.
+    /// The same of the mean error alone.
     pub bias_gain_interval: [f64; 2],
+    /// Whether the gain, and that of the mean error alone, is beyond chance.
+    pub is_clear: bool,
+    pub bias_is_clear: bool,
     /// Root mean square of the smooth residual, mm.
     pub rms_mm_before: f64,
     pub rms_mm_after: f64,

@@ -102,7 +102,8 @@ pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Key that sorts names with their numbers by value: 2.png before 10.png.
+/// Key that sorts names with their numbers by value: 2.png before 10.png, and 1.15.png before 1.2.png, as the
+/// seconds that they mostly are.
 pub(crate) fn by_number(path: &Path) -> String {
     const DIGITS: usize = 20;
     let (mut key, mut digits) = (String::new(), String::new());
@@ -113,7 +114,9 @@ pub(crate) fn by_number(path: &Path) -> String {
             continue;
         }
         if !digits.is_empty() {
-            key += &format!("{digits:0>DIGITS$}");
+            let is_decimal =
+                key.ends_with('.') && key[..key.len() - 1].ends_with(|c: char| c.is_ascii_digit());
+            key += &if is_decimal { digits.clone() } else { format!("{digits:0>DIGITS$}") };
             digits.clear();
         }
         key.extend(c);
@@ -146,9 +149,20 @@ mod tests {
 
     #[test]
     fn numbers_sort_by_value() {
-        let mut names = ["10.png", "2.png", "a10b1.png", "a9b20.png", "1.png", "0010b.png"];
+        let sorted = [
+            "1.png",
+            "2.png",
+            "10.png",
+            "0010b.png",
+            "13.175.png",
+            "13.2.png",
+            "a9b20.png",
+            "a10b1.png",
+        ];
+        let mut names = sorted;
+        names.reverse();
         names.sort_by_key(|name| by_number(Path::new(name)));
-        assert_eq!(names, ["1.png", "2.png", "10.png", "0010b.png", "a9b20.png", "a10b1.png"]);
+        assert_eq!(names, sorted);
     }
 
     #[test]

@@ -107,7 +107,7 @@ fn cut_up(frames: Vec<FrameRef>, film: Film, sensor: &Sensor) -> (Vec<View>, Vec
         long.enumerate().map(|(i, depth)| view(name(i, &depth, film), depth)).collect();
     let used: usize = views.iter().map(|v| v.depth.len()).sum();
     let mut remarks = Vec::new();
-    if (1..film.shortest()).contains(&longest) {
+    if (1..film.shortest()).contains(&longest) && longest < readable {
         remarks.push(format!(
             "no stretch is still for {} frames, the longest for {longest}: target or sensor may be moving; hold still for a second at every pose",
             film.shortest()

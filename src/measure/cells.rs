@@ -161,7 +161,7 @@ impl Context {
         let moving_frames = 1.0 + (frames - 1.0) * self.temporal_dilution();
         let absorbed = self.absorbed(frozen, moving_frames);
         let unbias = 1.0 / (1.0 - absorbed);
-        let spatial = ((s.e2 - s.shared).max(0.0) / s.n / self.cut_factor) * unbias;
+        let spatial = ((s.e2 - s.shared.max(0.0)).max(0.0) / s.n / self.cut_factor) * unbias;
         let total = total * unbias;
         // Squares of the covariance between two frames: frozen^2 off the diagonal.
         let moving = 1.0 - frozen;
@@ -242,7 +242,7 @@ impl Context {
     pub fn shared_by_a_frame(&self, s: &Sums) -> f64 {
         let within = if s.within_dof > 0.0 { s.within / s.within_dof } else { 0.0 };
         let by_noise = (self.frames - 1.0) * within * self.correlation_sum.min(s.pixels);
-        (s.between - by_noise).max(0.0)
+        s.between - by_noise
     }
 
     /// Share of one frame's variance that the plane fit absorbed.
@@ -314,6 +314,41 @@ mod tests {
         let jumping = context.cell(&Sums { shared, ..jumps }).unwrap();
         let expected = 0.012 + (1.0 - 0.108) * 1e-4;
         assert!((jumping.mean_std_error_m.powi(2) - expected).abs() < 1e-6, "{jumping:?}");
+    }
+
+    /// A tilted view of fifteen bins of white noise, each with its own frames' means: 9 of their sum of squares are by
+    /// chance in every bin, and nothing is shared.
+    #[test]
+    fn bins_without_shifts_keep_all_their_variance() {
+        let context = Context {
+            frames: 10.0,
+            cut_factor: 1.0,
+            correlation_sum: 1.0,
+            correlation_squares: 1.0,
+            temporal_rho: 0.0,
+            view_pixels: 15_000.0,
+            per_frame_planes: false,
+        };
+        let bin = Sums {
+            n: 1000.0,
+            z: 1000.0,
+            e2: 1000.0,
+            p2: 1000.0,
+            pixels: 100.0,
+            within: 900.0,
+            within_dof: 900.0,
+            bins: 1.0,
+            ..Sums::default()
+        };
+        let mut whole = Sums::default();
+        for k in 0..15 {
+            // By chance more in one bin, and less in the next.
+            let between = 9.0 + if k % 2 == 0 { 4.0 } else { -4.0 };
+            let mine = Sums { between, ..bin };
+            whole.merge(&Sums { shared: context.shared_by_a_frame(&mine), ..mine });
+        }
+        let sigma = context.cell(&whole).unwrap().spread.spatial_m;
+        assert!((sigma - 1.0).abs() < 1e-3, "{sigma}");
     }
 
     /// Compares with the plain double sum.

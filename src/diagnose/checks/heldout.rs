@@ -15,9 +15,11 @@ use crate::diagnose::views::samples::ViewData;
 use crate::stats::{mean, student_quantile};
 use crate::terms::{Statistic, Term};
 
-/// One view in this many is held out, and of small recordings up to three in nine: few have no scatter of their own.
+/// One view in this many is held out; of small recordings one in three, up to three: fewer have no scatter of
+/// their own.
 const KEPT_ASIDE: usize = 4;
-const FEW_ASIDE: [usize; 2] = [3, 3];
+const OF_FEW_ASIDE: usize = 3;
+const FEW_ASIDE: usize = 3;
 /// Fewest views from which any can be spared.
 const MIN_VIEWS: usize = 6;
 
@@ -38,8 +40,7 @@ impl Case<'_> {
         let mut rng = seed.stream("diagnose/heldout");
         let mut order: Vec<usize> = (0..n).collect();
         order.shuffle(&mut rng);
-        let [most, share] = FEW_ASIDE;
-        let mut aside = order[..(n / KEPT_ASIDE).max(most.min(n / share))].to_vec();
+        let mut aside = order[..(n / KEPT_ASIDE).max(FEW_ASIDE.min(n / OF_FEW_ASIDE))].to_vec();
         aside.sort_unstable();
         let rest: Vec<usize> = (0..n).filter(|v| !aside.contains(v)).collect();
         let (chosen_on, judged_on) = (survey.subset(&rest), survey.subset(&aside));
@@ -86,6 +87,8 @@ impl Case<'_> {
             gain,
             gain_interval: interval_of_mean(&gains)?,
             bias_gain_interval: interval_of_mean(&of_bias)?,
+            is_clear: is_clear(&gains),
+            bias_is_clear: is_clear(&of_bias),
             rms_mm_before: mm_before,
             rms_mm_after: mm_after,
             rms_px_before: px_before,
@@ -154,6 +157,15 @@ fn noise_score(blocks: &ViewData, terms: &[Term]) -> f64 {
     -left.iter().zip(&blocks.weight).map(|(log, w)| w * (log.exp_m1() - log)).sum::<f64>()
 }
 
+/// Whether views gain beyond chance: their mean, or each of them and all together more than chance brings to one
+/// in twenty (the gain is the logarithm of a likelihood ratio). Near views gain more than far ones, and no
+/// interval of few such gains says as much.
+fn is_clear(gains: &[f64]) -> bool {
+    let each = gains.iter().all(|gain| *gain > 0.0);
+    let together = gains.iter().sum::<f64>() > 20f64.ln();
+    interval_of_mean(gains).is_some_and(|[low, _]| low > 0.0 || each && together)
+}
+
 /// 95 % interval of the mean by Student's t; `None` with fewer than two values.
 fn interval_of_mean(values: &[f64]) -> Option<[f64; 2]> {
     let n = values.len() as f64;
@@ -174,5 +186,12 @@ mod tests {
         assert_eq!(interval_of_mean(&[0.0; 4]), Some([0.0; 2]));
         let [low, high] = interval_of_mean(&[10.0, 12.0]).expect("two views");
         assert!((low - (11.0 - 12.706)).abs() < 1e-3 && (high - (11.0 + 12.706)).abs() < 1e-3);
+        let cases = [
+            (&[10.0, 2.0][..], true),
+            (&[10.0, -1.0], false),
+            (&[1.0, 1.5], false),
+            (&[9.0], false),
+        ];
+        cases.iter().for_each(|(gains, clear)| assert_eq!(is_clear(gains), *clear, "{gains:?}"));
     }
 }

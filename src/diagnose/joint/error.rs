@@ -112,7 +112,7 @@ impl Joint<'_> {
             let mut seen = Vec::new();
             for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
                 let mut place = pixels.place(v * camera.width + u);
-                (place.disparity, place.z) = (plane.disparity, plane.z);
+                (place.disparity, place.z, place.rho) = (plane.disparity, plane.z, plane.z);
                 self.columns.fill(&place, &mut row);
                 let columns = places.iter().map(|&k| row[k]).enumerate();
                 seen.push(DesignRow(columns.filter(|(_, g)| *g != 0.0).collect()));

@@ -105,7 +105,8 @@ impl Joint<'_> {
         let precision = &self.columns.precision * dispersion;
         let beta = whole.fit(&kept, &precision)?;
         let inverse = held(dispersion)?;
-        // Of the posterior; what the views alone would scatter by is less where the prior holds.
+        // A parameter errs by its posterior. A name is lost by what the estimate scatters by, which the prior
+        // makes less.
         let errors = clustered(&inverse, dispersion, &beyond);
         let scattered = clustered(&inverse, 1.0, &beyond);
         let planes = (camera, far_to_near(self.data));

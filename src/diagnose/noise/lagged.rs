@@ -57,3 +57,28 @@ pub fn of_any_two_frames(lagged: [f64; 3], n: usize) -> f64 {
     }
     if pairs > 0.0 { sum / pairs } else { lagged[0] }
 }
+
+/// Correlation of successive frames behind a first-order filter, from that of the frames by lag: beside a constant,
+/// it falls by the same factor from lag to lag. Zero where it hardly falls.
+pub fn fading([first, second, last]: [f64; 3]) -> f64 {
+    /// Five standard errors of a correlation of 10,000 pixels.
+    const FALLS: f64 = 0.05;
+    let fall = first - second;
+    if fall > FALLS { ((second - last) / fall).clamp(0.0, 0.95) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Behind a filter of .6, beside a pattern of half of the variance, and of a pattern alone.
+    #[test]
+    fn a_filter_is_told_from_what_stands_still() {
+        let rho: f64 = 0.6;
+        let beside = |still: f64| [1, 2, 3].map(|lag| still + (1.0 - still) * rho.powi(lag));
+        for still in [0.0, 0.5] {
+            assert!((fading(beside(still)) - rho).abs() < 1e-12);
+        }
+        assert_eq!(fading([0.5, 0.48, 0.5]), 0.0);
+    }
+}

@@ -96,10 +96,13 @@ impl<'a> Tried<'a> {
         let mut ratios = Vec::new();
         for e in &evidence {
             let inverse = Cholesky::of(&e.a + DMatrix::identity(k, k) * prior)?.inverse();
-            // One view may show few of the columns.
-            let freedom = e.a.component_mul(&inverse).sum();
-            if freedom >= 0.5 {
-                let quarter = ChiSquared::new(freedom).ok()?.inverse_cdf(0.25);
+            // One view may show few of the columns, or hardly: a sum of chi squared with these weights
+            // (Satterthwaite 1946).
+            let shown = &e.a * &inverse;
+            let (weight, squares) = (shown.trace(), (&shown * &shown).trace());
+            if weight >= 0.5 {
+                let freedom = weight * weight / squares;
+                let quarter = ChiSquared::new(freedom).ok()?.inverse_cdf(0.25) * squares / weight;
                 ratios.push(e.b.dot(&(inverse * &e.b)) / quarter);
             }
         }

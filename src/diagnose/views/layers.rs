@@ -12,7 +12,7 @@ use super::samples::{COARSE_PX, ViewData, coarser};
 use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
 use super::tiles::{Tile, roughen, tiles};
 use crate::diagnose::checks::replication::halves;
-use crate::diagnose::noise::lagged::of_any_two_frames;
+use crate::diagnose::noise::lagged::{fading, of_any_two_frames};
 use crate::diagnose::options::Ablation;
 use crate::diagnose::search::view_levels::{MODEL_TOLERANCE, view_scatter};
 use crate::diagnose::steps::lattice::Step;
@@ -225,12 +225,10 @@ impl Survey {
                 continue;
             }
             view.between_frame_factor = Some(all / (all - 1.0) / (1.0 - mean.max(0.0)));
-            // What stands still takes no part; what fades repeats itself.
-            let [first, second, last] = common;
-            let fading = [first, second].map(|c| (c - last) / (1.0 - last).max(0.1));
-            let squares =
-                (1..).zip(fading).map(|(lag, c)| c * c * (1.0 - f64::from(lag) / all).max(0.0));
-            view.frames = (all - 1.0) / (1.0 + 2.0 * squares.sum::<f64>());
+            // What stands still takes no part; the noise behind a filter repeats itself.
+            let rho = fading(common);
+            let repeated = (1..n).map(|lag| rho.powi(2 * lag as i32) * (1.0 - lag as f64 / all));
+            view.frames = (all - 1.0) / (1.0 + 2.0 * repeated.sum::<f64>());
         }
     }
 

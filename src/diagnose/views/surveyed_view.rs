@@ -59,22 +59,30 @@ pub fn inflation(field: &Field, bias: &[f32]) -> (f64, Correlation) {
 
 /// Restores the sum of the correlation from before the high-pass; returns the share of the variance that the
 /// high-pass took. A box mean of B pixels, subtracted, lowers the covariance at all lags within the box by the
-/// share t = C / B of the variance, where C is the sum of the correlation: rho' = (rho - t) / (1 - t).
+/// share t = C / B of the variance, where C is the sum of the correlation there: rho' = (rho - t) / (1 - t). A
+/// correlation that does not die out is a smooth error rather than noise, and stays as measured.
 fn restore_sum(correlation: &mut Correlation) -> f64 {
     /// Each shrinks the error by t: from a fifth to less than a hundredth.
     const ROUNDS: usize = 3;
-    /// Beyond, it is a smooth error rather than noise.
+    const REACH: usize = SMOOTH_PX / 2;
+    /// Largest share, that of a window of 35 px.
     const MAX_TAKEN: f64 = 0.5;
-    let taken = |sum: f64| (sum / (SMOOTH_PX * SMOOTH_PX) as f64).min(MAX_TAKEN);
-    for _ in 0..ROUNDS {
-        let t = taken(correlation.sum);
-        let [across, down] = [&correlation.along_u, &correlation.along_v].map(|rho| {
-            let lags = 2.0 * (rho.len() - 1) as f64;
-            (1.0 - t) * (1.0 + 2.0 * rho[1..].iter().sum::<f64>()) + t * (1.0 + lags)
-        });
-        correlation.sum = (across * down).max(1.0);
+    if correlation.persists {
+        return 0.0;
     }
-    taken(correlation.sum)
+    let two_sided = |rho: &[f64]| 2.0 * rho.iter().sum::<f64>();
+    let mut taken = 0.0;
+    for _ in 0..ROUNDS {
+        let [across, down] = [&correlation.along_u, &correlation.along_v].map(|rho| {
+            let (near, far) = rho[1..].split_at(REACH.min(rho.len() - 1));
+            let lags = 1.0 + 2.0 * near.len() as f64;
+            let near = (1.0 - taken) * (1.0 + two_sided(near)) + taken * lags;
+            [near, near + two_sided(far)]
+        });
+        correlation.sum = (across[1] * down[1]).max(1.0);
+        taken = (across[0] * down[0] / (SMOOTH_PX * SMOOTH_PX) as f64).clamp(0.0, MAX_TAKEN);
+    }
+    taken
 }
 
 /// Whitened and high-passed residuals as an image of the target alone, `cut`.
@@ -205,40 +213,32 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
+    use crate::diagnose::views::blocks::{BLOCK_TILES, blocks};
+    use crate::diagnose::views::tiles::SIDE;
+    use crate::plane::Plane;
+    use crate::rng::Seed;
+    use crate::simulate::kinect_v1;
+    use crate::stats::noise_through_boxes;
+    use crate::terms::{Basis, Coordinate, Modulation};
 
     /// White noise averaged over boxes: the variance of the mean over the whole target is `side`^2 times that of
     /// independent pixels, which the high-pass must not hide. The small correlations at the longest lags are lost.
     #[test]
     fn the_high_pass_takes_nothing_from_the_inflation() {
         const SIZE: [usize; 2] = [320, 240];
-        let [width, height] = SIZE;
         for (side, least) in [(1, 0.98), (5, 0.95), (9, 0.92)] {
             let mut rng = Seed(side as u64).stream("inflation");
-            let (across, down) = (width + side, height + side);
-            let white: Vec<f64> =
-                (0..across * down).map(|_| StandardNormal.sample(&mut rng)).collect();
-            let summed = SummedArea::of(across, down, |i| Some([white[i]]));
-            let mean = |i: usize| {
-                let (u, v) = (i % width, i / width);
-                (summed.window([u, u + side], [v, v + side])[0] / side as f64) as f32
-            };
-            let n = width * height;
+            let noise = noise_through_boxes(SIZE, side, &mut rng);
+            let n = noise.len();
             let field = Field {
                 sigma: vec![1.0; n],
-                mean: (0..n).map(mean).collect(),
+                mean: noise.iter().map(|e| *e as f32).collect(),
                 ..Field::unseen(Plane::tilted(1.0, 0.0, 0.0), 10.0, SIZE, (0..n as u32).collect())
             };
             let ratio = inflation(&field, &[]).0 / (side * side) as f64;
             assert!((least..1.06).contains(&ratio), "{side}: {ratio}");
         }
     }
-    use crate::diagnose::views::blocks::{BLOCK_TILES, blocks};
-    use crate::diagnose::views::tiles::SIDE;
-    use crate::plane::Plane;
-    use crate::rng::Seed;
-    use crate::simulate::kinect_v1;
-    use crate::stats::SummedArea;
-    use crate::terms::{Basis, Coordinate, Modulation};
 
     /// A tilted wall seen by a sensor of Eq. 1 whose noise is Gaussian in depth; the means are noise-free.
     fn view() -> SurveyedView {

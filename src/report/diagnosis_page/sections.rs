@@ -96,7 +96,7 @@ pub(super) fn held_out(diagnosis: &Diagnosis) -> Markup {
         @if not_scored {
             p { "What was found has no part in this score." }
         } @else { p {
-            @if held.gain_interval[0] > 0.0 { "The extended model predicts such a view better by " }
+            @if held.is_clear { "The extended model predicts such a view better by " }
             @else { "No gain beyond chance: the extended model differs by " }
             b { (gain) " nats a view" }
             " (95 % interval " (low) " to " (high) ", by the scatter of the views). "

@@ -99,6 +99,8 @@ fn diagnosis(verdict: Verdict, findings: Vec<Finding>) -> Diagnosis {
         gain: 42.31,
         gain_interval: [31.2, 55.0],
         bias_gain_interval: [31.2, 55.0],
+        is_clear: true,
+        bias_is_clear: true,
         rms_mm_before: 3.12,
         rms_mm_after: 1.17,
         rms_px_before: 0.214,
