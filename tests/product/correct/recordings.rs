@@ -123,7 +123,7 @@ fn raw_disparities_become_fine_metric_words_unless_kept() {
     assert!(fs::read_to_string(files.at("out/recording.json")).expect("read").contains("raw_disp"));
 }
 
-/// Lists may name PGMs. A view that cannot be read would pass for one in the new code.
+/// Lists may name a dump's PGMs. A view that cannot be read would pass for one in the new code.
 #[test]
 fn a_recoded_recording_can_be_read_whatever_its_images() {
     let files = Files::new();
@@ -133,11 +133,14 @@ fn a_recoded_recording_can_be_read_whatever_its_images() {
     for view in open_uncut(&recording, &Assumed::default()).expect("opened").views {
         for frame in &view.depth {
             let words = source.read(&frame.path).expect("read");
-            fs::write(frame.path.with_extension("pgm"), encode_pgm16(&words)).expect("written");
+            let name = frame.path.file_stem().expect("a name").to_string_lossy();
+            let pgm = frame.path.with_file_name(format!("d-{name}.pgm"));
+            fs::write(pgm, encode_pgm16(&words)).expect("written");
             fs::remove_file(&frame.path).expect("removed");
         }
         let list = recording.join(&view.name).join("depth.txt");
-        let named = fs::read_to_string(&list).expect("a list").replace(".png", ".pgm");
+        let named = fs::read_to_string(&list).expect("a list");
+        let named = named.replace(".png", ".pgm").replace("depth/", "depth/d-");
         fs::write(list, named).expect("written");
     }
     let both = r#"{"roi": [1, 1, 9, 9], "polygon": [[1, 1], [9, 1], [9, 9]]}"#;
