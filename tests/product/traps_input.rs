@@ -294,7 +294,8 @@ fn a_tum_folder_has_one_camera_for_every_command() {
     assert!(remarks.iter().any(|r| r.contains("freiburg1: its published camera")), "{remarks:?}");
     let (camera, remarks) = write("# file: 'mine.bag'");
     assert_eq!((camera.fx, camera.distortion), (525.0, None));
-    assert!(remarks.iter().any(|r| r.contains("525,525,319.5,239.5 assumed")), "{remarks:?}");
+    let assumed = "525,525,319.5,239.5 and 5000 units a metre assumed";
+    assert!(remarks.iter().any(|r| r.contains(assumed)), "{remarks:?}");
 }
 
 #[test]
