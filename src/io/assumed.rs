@@ -151,15 +151,20 @@ impl Assumed {
             return Ok((sensor, Some(remark)));
         }
         let open = self.intrinsics.is_none() && self.preset.is_none();
-        let mut assumed = Vec::new();
-        assumed.extend(open.then_some(["intrinsics", "525,525,319.5,239.5", "--intrinsics"]));
-        let unit = ["unit", "5000 units a metre", "--units-per-metre"];
-        assumed.extend(self.code.is_none().then_some(unit));
-        let [what, values, options] =
-            [0, 1, 2].map(|k| assumed.iter().map(|a| a[k]).collect::<Vec<_>>().join(" and no "));
-        let [values, options] = [values, options].map(|list| list.replace(" and no ", " and "));
-        let remark = format!("a TUM folder carries no {what}: {values} assumed; give {options}");
-        let remark = (!assumed.is_empty()).then_some(remark);
+        let remark = match (open, self.code.is_none()) {
+            (true, true) => Some(
+                "a TUM folder carries no intrinsics and no unit: 525,525,319.5,239.5 and 5000 units a metre \
+                 assumed; give --intrinsics and --units-per-metre",
+            ),
+            (true, false) => Some(
+                "a TUM folder carries no intrinsics: 525,525,319.5,239.5 assumed; give --intrinsics",
+            ),
+            (false, true) => Some(
+                "a TUM folder carries no unit: 5000 units a metre assumed; give --units-per-metre",
+            ),
+            (false, false) => None,
+        };
+        let remark = remark.map(String::from);
         Ok((self.sensor(NAME, size, ROS_INTRINSICS, TUM_CODE)?, remark))
     }
 
@@ -185,23 +190,23 @@ impl Assumed {
         if self.code.is_some() {
             return Ok((sensor, None));
         }
-        let (code, why) =
-            match (RawValues::of(images.iter()).code(sensor.may_be_kinect()), self.preset) {
-                (Ok(decided), _) => decided,
-                (Err(_), Some(preset)) => {
-                    let units_per_metre = PRESET_UNITS_PER_METRE;
-                    let millimetres = DepthCode::Metric { units_per_metre, invalid: 0 };
-                    (
-                        millimetres,
-                        format!("millimetres assumed, as the driver of {} gives them", preset.id),
-                    )
-                }
-                (Err(what), None) => {
-                    const REMEDY: &str =
-                        "give --units-per-metre (1000 = mm, 5000 = TUM) or --raw-disparity";
-                    return Err(Error::recording(root, what, REMEDY));
-                }
-            };
+        let decided = RawValues::of(images.iter()).code(sensor.may_be_kinect());
+        let (code, why) = match (decided, self.preset) {
+            (Ok(decided), _) => decided,
+            (Err(_), Some(preset)) => {
+                let units_per_metre = PRESET_UNITS_PER_METRE;
+                let millimetres = DepthCode::Metric { units_per_metre, invalid: 0 };
+                (
+                    millimetres,
+                    format!("millimetres assumed, as the driver of {} gives them", preset.id),
+                )
+            }
+            (Err(what), None) => {
+                const REMEDY: &str =
+                    "give --units-per-metre (1000 = mm, 5000 = TUM) or --raw-disparity";
+                return Err(Error::recording(root, what, REMEDY));
+            }
+        };
         sensor.code = code;
         Ok((sensor, Some(format!("{why}; give --units-per-metre or --raw-disparity if not"))))
     }

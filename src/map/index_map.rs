@@ -56,19 +56,20 @@ struct BlockGrid {
     height: usize,
 }
 
-/// Margin on the squared rays of the pixels' centres, for the outer halves of the last ones.
-const BEYOND: f32 = 1.1;
-
-/// Largest squared ray of the image's border.
-fn largest_ray(camera: &Camera) -> f32 {
+/// Largest squared ray of an image behind a lens: that of a corner. Its margin is for the outer halves of the last
+/// pixels and for a tangential shift.
+fn reach(camera: &Camera) -> f32 {
+    const BEYOND: f64 = 1.1;
+    if camera.distortion.is_none() {
+        return f32::INFINITY;
+    }
     let (right, below) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
-    let rows = (0..camera.height).flat_map(|v| [(0.0, v as f64), (right, v as f64)]);
-    let columns = (0..camera.width).flat_map(|u| [(u as f64, 0.0), (u as f64, below)]);
     let square = |(u, v): (f64, f64)| {
         let (x, y) = camera.ray(u, v);
         x * x + y * y
     };
-    rows.chain(columns).map(square).fold(0.0, f64::max) as f32
+    let corners = [(0.0, 0.0), (right, 0.0), (0.0, below), (right, below)];
+    (BEYOND * corners.map(square).into_iter().fold(0.0, f64::max)) as f32
 }
 
 impl BlockGrid {
@@ -79,7 +80,7 @@ impl BlockGrid {
             // Pixel centres are whole numbers.
             centre: [camera.cx, camera.cy].map(|c| ((c + 0.5) / side) as f32),
             distortion: camera.distortion.map(|k| k.map(|k| k as f32)),
-            reach: BEYOND * largest_ray(camera),
+            reach: reach(camera),
             width: camera.width / side_px,
             height: camera.height / side_px,
         }

@@ -192,8 +192,9 @@ impl Context {
         })
     }
 
-    /// Standard error of the mean depth and its part by shifts, from the variance `spatial` of a frame, its share `frozen` that more
-    /// frames do not average out, and the shifts of whole frames beyond the variance `within` pixels.
+    /// Standard error of the mean depth and its part by shifts, from the variance `spatial` of a frame, its share
+    /// `frozen` that more frames do not average out, and the shifts of whole frames beyond the variance `within`
+    /// pixels.
     fn mean_std_errors_m(&self, s: &Sums, spatial: f64, frozen: f64, within: f64) -> [f64; 2] {
         let frames = (s.n / s.pixels.max(1.0)).max(1.0);
         let further = frames - 1.0;
@@ -221,8 +222,8 @@ impl Context {
         1.0 + (frames - 1.0) * (1.0 - self.temporal_rho) / (1.0 + self.temporal_rho)
     }
 
-    /// Independent frames per frame, for the variance of the moving part: the squares of a first-order correlation sum to
-    /// (1 + rho^2) / (1 - rho^2).
+    /// Independent frames per frame, for the variance of the moving part: the squares of a first-order correlation
+    /// sum to (1 + rho^2) / (1 - rho^2).
     fn temporal_dilution(&self) -> f64 {
         let square = self.temporal_rho * self.temporal_rho;
         (1.0 - square) / (1.0 + square)
@@ -269,6 +270,19 @@ const MAX_SHARED: f64 = 0.8;
 mod tests {
     use super::*;
 
+    /// A view of ten frames of white noise.
+    fn white(view_pixels: f64) -> Context {
+        Context {
+            frames: 10.0,
+            cut_factor: 1.0,
+            correlation_sum: 1.0,
+            correlation_squares: 1.0,
+            temporal_rho: 0.0,
+            view_pixels,
+            per_frame_planes: false,
+        }
+    }
+
     #[test]
     fn a_frontal_view_is_one_bin_and_a_tilted_one_many() {
         assert_eq!(Bins::between(1.0, 1.05).count, 1);
@@ -281,15 +295,7 @@ mod tests {
 
     #[test]
     fn white_noise_in_time_counts_every_frame_and_frozen_noise_only_one() {
-        let context = Context {
-            frames: 10.0,
-            cut_factor: 1.0,
-            correlation_sum: 1.0,
-            correlation_squares: 1.0,
-            temporal_rho: 0.0,
-            view_pixels: 1000.0,
-            per_frame_planes: false,
-        };
+        let context = white(1000.0);
         let base = Sums {
             n: 10_000.0,
             z: 10_000.0,
@@ -320,15 +326,7 @@ mod tests {
     /// chance in every bin, and nothing is shared.
     #[test]
     fn bins_without_shifts_keep_all_their_variance() {
-        let context = Context {
-            frames: 10.0,
-            cut_factor: 1.0,
-            correlation_sum: 1.0,
-            correlation_squares: 1.0,
-            temporal_rho: 0.0,
-            view_pixels: 15_000.0,
-            per_frame_planes: false,
-        };
+        let context = white(15_000.0);
         let bin = Sums {
             n: 1000.0,
             z: 1000.0,

@@ -14,7 +14,7 @@ use crate::diagnose::checks::replication::spans;
 use crate::model::Covariance;
 use crate::rng::Seed;
 use crate::solve::Cholesky;
-use crate::terms::{PixelContext, Pixels};
+use crate::terms::Pixels;
 
 /// Share of the variance, pixel by pixel, that the factors must hold. The rest is independent per node.
 const HELD: f64 = 0.98;
@@ -33,7 +33,7 @@ const ROUNDS: usize = 4;
 const SPARE: usize = 8;
 
 impl Joint<'_> {
-    /// Covariance of the coefficients of [`Joint::chosen`], approximated for frontal planes as far as these places.
+    /// Covariance of the coefficients of [`Joint::chosen`], approximated for frontal planes of these disparities, px, and depths, m.
     /// `left` are the scores that the fit leaves in each view: views scatter beyond their noise, and
     /// the posterior is as much wider.
     pub fn error(
@@ -42,7 +42,7 @@ impl Joint<'_> {
         kept: &[usize],
         precision: &DVector<f64>,
         left: &[DVector<f64>],
-        planes: (&Camera, [PixelContext; 3]),
+        planes: (&Camera, [[f64; 2]; 3]),
     ) -> Option<Covariance> {
         let System { columns: places, held } = self.system(s, kept, precision);
         let n = places.len();
@@ -96,23 +96,19 @@ impl Joint<'_> {
     }
 
     /// The columns at pixels of frontal planes.
-    fn seen(
-        &self,
-        places: &[usize],
-        (camera, planes): (&Camera, [PixelContext; 3]),
-    ) -> Vec<DesignRow> {
+    fn seen(&self, places: &[usize], (camera, planes): (&Camera, [[f64; 2]; 3])) -> Vec<DesignRow> {
         let rays = camera.rays();
         let pixels = Pixels::new(camera, &rays, 1.0);
         let lines = |plane| {
             let rows = (STRIDE / 2..camera.height).into_par_iter().step_by(STRIDE);
             rows.map(move |v| (plane, v))
         };
-        let of_line = |(plane, v): (PixelContext, usize)| {
+        let of_line = |([disparity, z], v): ([f64; 2], usize)| {
             let mut row = vec![0.0; self.all.b.len()];
             let mut seen = Vec::new();
             for u in (STRIDE / 2..camera.width).step_by(STRIDE) {
                 let mut place = pixels.place(v * camera.width + u);
-                (place.disparity, place.z, place.rho) = (plane.disparity, plane.z, plane.z);
+                (place.disparity, place.z, place.rho) = (disparity, z, z);
                 self.columns.fill(&place, &mut row);
                 let columns = places.iter().map(|&k| row[k]).enumerate();
                 seen.push(DesignRow(columns.filter(|(_, g)| *g != 0.0).collect()));

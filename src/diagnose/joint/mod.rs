@@ -21,7 +21,7 @@ use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::evidence::Gain;
 use crate::diagnose::search::outcome::{Chosen, Outcome};
 use crate::diagnose::views::samples::{COARSE_PX, ViewData, coarser};
-use crate::terms::{Gauge, PixelContext};
+use crate::terms::Gauge;
 use columns::Columns;
 use error::clustered;
 use fit::{Joint, Reduced};
@@ -256,13 +256,13 @@ impl Joint<'_> {
     }
 }
 
-/// Far, middle and near places: the 10 %, 50 % and 90 % quantiles by the disparity of the views' samples.
-fn far_to_near(data: &[ViewData]) -> [PixelContext; 3] {
-    let mut all: Vec<&PixelContext> = data.iter().flat_map(|v| v.places.iter()).collect();
-    all.par_sort_unstable_by(|a, b| a.disparity.total_cmp(&b.disparity));
-    [0.1, 0.5, 0.9].map(|share| {
-        all.get((share * all.len() as f64) as usize).map_or_else(PixelContext::default, |p| **p)
-    })
+/// Disparity, px, and depth, m, far, middle and near: the 10 %, 50 % and 90 % quantiles of the views' samples.
+fn far_to_near(data: &[ViewData]) -> [[f64; 2]; 3] {
+    let places = data.iter().flat_map(|v| v.places.iter());
+    let mut all: Vec<[f64; 2]> = places.map(|p| [p.disparity, p.z]).collect();
+    all.par_sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    [0.1, 0.5, 0.9]
+        .map(|share| all.get((share * all.len() as f64) as usize).copied().unwrap_or([1.0; 2]))
 }
 
 #[cfg(test)]

@@ -27,8 +27,8 @@ impl Squares {
     /// Scatter of the slopes of a view's frames about a line in time, over both axes of the picture: px^2 at
     /// one standard deviation of the target's pixels from its centre.
     ///
-    /// Uses the frames kept; `mean_px2` is the variance of a frame's mean. `None` with fewer than three. The error of the slopes is larger where the noise grows away
-    /// from the centre, as on a tilted target.
+    /// Uses the frames kept; `mean_px2` is the variance of a frame's mean. `None` with fewer than three. The error
+    /// of the slopes is larger where the noise grows away from the centre, as on a tilted target.
     pub fn of_slopes(field: &Field, mean_px2: f64) -> Option<Self> {
         let axes = axes(field)?;
         let slopes = field.first.iter().map(|r| slopes(field, r, &axes));
@@ -192,14 +192,11 @@ mod tests {
     fn an_excess_errs_as_it_says() {
         let mut rng = Seed(1).stream("frame-series/excess");
         let mut draw = || {
-            let sum = (0..36)
-                .map(|_| {
-                    2.0 * {
-                        let x: f64 = StandardNormal.sample(&mut rng);
-                        x * x
-                    }
-                })
-                .sum();
+            let mut square = || {
+                let x: f64 = StandardNormal.sample(&mut rng);
+                2.0 * x * x
+            };
+            let sum = (0..36).map(|_| square()).sum();
             let view = Squares { sum, freedom: 36.0, expected: 1.0 };
             Excess::of([view].into_iter(), 1.0, 1.0)
         };

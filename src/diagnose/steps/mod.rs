@@ -134,9 +134,9 @@ pub(in crate::diagnose) fn own_step_note(step: f64) -> String {
 /// 2008). The error of coarser steps follows the surface.
 pub(in crate::diagnose) const COARSE_SIGMAS: f64 = 2.0;
 
-/// Drops windows, line variances and the sizes of single frames of views with coarse steps other than those of the recording's own words.
-/// Neighbours in one step err together, and whether a pixel jumps between frames depends on where in a step its
-/// line lies.
+/// Drops windows, line variances and the sizes of single frames of views with coarse steps other than those of
+/// the recording's own words. Neighbours in one step err together, and whether a pixel jumps between frames
+/// depends on where in a step its line lies.
 pub(in crate::diagnose) fn forget_windows(
     structure: &mut [Structure],
     fields: &[Field],
