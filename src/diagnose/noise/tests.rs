@@ -280,36 +280,6 @@ fn motion_is_what_all_views_have_in_common() {
     assert!((velocity - 0.003).abs() < 3.0 * error && error < 0.001, "{velocity} +- {error}");
 }
 
-/// Each pair of views counts twice: of 400 recordings, 20 false alarms are expected at 5 %, and more than 36
-/// have a chance of 3e-4. Without the factor for pairs there are 51.
-#[test]
-fn what_views_share_errs_as_pairs_do() {
-    const OF: usize = 8;
-    const PIXELS: usize = 400;
-    let alarms = (0..400)
-        .filter(|&seed| {
-            let mut rng = Seed(seed).stream("noise/pairs");
-            let images: Vec<Vec<f64>> =
-                (0..OF).map(|_| (0..PIXELS).map(|_| normal(&mut rng)).collect()).collect();
-            let sum: Vec<f64> = (0..PIXELS).map(|i| images.iter().map(|m| m[i]).sum()).collect();
-            let with_others = |image: &Vec<f64>| {
-                let products = image.iter().zip(&sum).map(|(r, s)| r * (s - r)).sum::<f64>();
-                products / (PIXELS * (OF - 1)) as f64
-            };
-            let views: Vec<Structure> = images
-                .iter()
-                .map(|m| Structure {
-                    pixels: PIXELS as f64,
-                    still: Still { fixed_px2: Some(with_others(m)), ..Still::default() },
-                    ..Structure::default()
-                })
-                .collect();
-            ViewMean::of_pairs(&views, |s| s.still.fixed_px2).expect("a mean").p_above(0.0) < 0.05
-        })
-        .count();
-    assert!(alarms <= 36, "{alarms} of 400");
-}
-
 #[test]
 fn one_view_is_no_sample() {
     let mut rng = Seed(7).stream("noise/one");

@@ -78,3 +78,22 @@ impl NoiseGains {
         (above as f64 / gains.len() as f64).max(TAIL)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thresholds_and_chances_are_each_others_inverse() {
+        let gains = NoiseGains::simulated(600, 0.5, |k| -(1.0 - (k + 1) as f64 / 601.0).ln());
+        // Exponential: exceeded with probability exp(-g).
+        for level in [0.05, 0.01, 1e-3, 1e-5] {
+            let threshold = gains.threshold(level);
+            assert!((gains.p(threshold) / level - 1.0).abs() < 1e-9, "{level}");
+            assert!((threshold / -level.ln() - 1.0).abs() < 0.08, "{level}: {threshold}");
+        }
+        assert!(gains.p(0.0) > 0.9 && gains.p(0.0) <= 1.0);
+        assert!(NoiseGains::default().threshold(0.05) == f64::INFINITY);
+        assert!(NoiseGains::default().p(1e9) == 1.0);
+    }
+}

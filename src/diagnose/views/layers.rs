@@ -6,10 +6,11 @@ use rayon::prelude::*;
 
 use super::blocks::{BLOCK_TILES, block_tiles, blocks};
 use super::field::Field;
+use super::inflation::{independent_frames, inflations};
 use super::learnt::Learnt;
 use super::light::{Light, relative_light};
 use super::samples::{COARSE_PX, ViewData, coarser};
-use super::surveyed_view::{SurveyedView, independent_frames, inflation, mean_data};
+use super::surveyed_view::{SurveyedView, mean_data};
 use super::tiles::{Tile, roughen, tiles};
 use crate::diagnose::checks::replication::halves;
 use crate::diagnose::noise::lagged::{fading, of_any_two_frames};
@@ -20,7 +21,7 @@ use crate::diagnose::steps::rounding::Rounding;
 use crate::effects::Flat;
 use crate::measure::Workbench;
 use crate::sensors::SensorKind;
-use crate::stats::{Correlation, median};
+use crate::stats::Correlation;
 use crate::terms::{Extent, PixelContext, Term};
 
 /// The tiles of all views, with each view's weight.
@@ -49,33 +50,6 @@ pub struct Survey {
     /// Steps whose waves show in single views.
     pub rounding: Option<Rounding>,
     pub ablation: Ablation,
-}
-
-/// Fewest independent samples for a view's own correlation estimate. The standard error is then a tenth, and
-/// subtracting the view's mean makes the correlation look shorter.
-const FEW_SAMPLES: f64 = 100.0;
-
-/// Inflation of the views' means and correlation of their pixels, with this bias subtracted. All views of a
-/// sensor share one matching window, so a view too small to show it gets at least the median of the larger
-/// half of the views.
-fn inflations(fields: &[Field], bias: &[Vec<f32>]) -> Vec<(f64, Correlation)> {
-    let of = |(n, f): (usize, &Field)| inflation(f, bias.get(n).map_or(&[], |b| &b[..]));
-    let mut all: Vec<(f64, Correlation)> = fields.par_iter().enumerate().map(of).collect();
-    let pixels = |f: &Field| f.pixels.len() as f64;
-    let middle_px = median(&mut fields.iter().map(pixels).collect::<Vec<f64>>());
-    let middle = |of: &dyn Fn(&Correlation) -> f64| {
-        let large = all.iter().zip(fields).filter(|(_, f)| pixels(f) >= middle_px);
-        median(&mut large.map(|((_, c), _)| of(c)).collect::<Vec<f64>>())
-    };
-    let (sum, squares) = (middle(&|c| c.sum), middle(&|c| c.sum_of_squares));
-    for ((inflation, correlation), field) in all.iter_mut().zip(fields) {
-        if pixels(field) < FEW_SAMPLES * squares {
-            *inflation *= (sum / correlation.sum).max(1.0);
-            correlation.sum = correlation.sum.max(sum);
-            correlation.sum_of_squares = correlation.sum_of_squares.max(squares);
-        }
-    }
-    all
 }
 
 impl Survey {
@@ -269,47 +243,5 @@ impl Survey {
     /// Whether each view is in the second half.
     pub fn second(&self) -> Vec<bool> {
         self.views.iter().map(|v| v.in_second_half).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::plane::Plane;
-    use crate::rng::{Seed, Stream};
-    use crate::stats::noise_through_boxes;
-
-    /// Mean of a target of this size, white noise smoothed by boxes of `side` px.
-    fn field([width, height]: [usize; 2], side: usize, rng: &mut Stream) -> Field {
-        let noise = noise_through_boxes([width, height], side, rng);
-        let n = width * height;
-        let plane = Plane::tilted(1.0, 0.0, 0.0);
-        Field {
-            sigma: vec![1.0; n],
-            mean: noise.into_iter().map(|r| r as f32).collect(),
-            count: vec![1; n],
-            ..Field::unseen(plane, 40.0, [width, height], (0..n as u32).collect())
-        }
-    }
-
-    /// On 22 x 16 px alone a box of 9 px looks like one of 6 px; a view that shows its own window keeps it.
-    #[test]
-    fn a_view_too_small_to_show_a_window_has_that_of_the_others() {
-        let mut rng = Seed(1).stream("layers/window");
-        let mut fields: Vec<Field> =
-            [9, 9, 9, 3].map(|side| field([160, 120], side, &mut rng)).into();
-        fields.push(field([22, 16], 9, &mut rng));
-        let alone: Vec<(f64, Correlation)> = fields.iter().map(|f| inflation(f, &[])).collect();
-        let beside = inflations(&fields, &[]);
-        assert!(alone[..4] == beside[..4]);
-        let squares =
-            |all: &[(f64, Correlation)]| all[4].1.sum_of_squares / all[0].1.sum_of_squares;
-        assert!(
-            squares(&alone) < 0.6 && squares(&beside) > 0.9,
-            "{:?}",
-            [&alone, &beside].map(|a| squares(a))
-        );
-        let more = beside[4].1.sum / alone[4].1.sum;
-        approx::assert_relative_eq!(beside[4].0, more * alone[4].0, max_relative = 1e-12);
     }
 }

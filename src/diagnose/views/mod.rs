@@ -6,6 +6,7 @@ pub mod box_sums;
 pub mod column_steps;
 pub mod exposure;
 pub mod field;
+pub mod inflation;
 pub mod infrared;
 pub mod known;
 pub mod known_error;
