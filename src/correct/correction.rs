@@ -1,12 +1,14 @@
 //! A model's sensor biases, prepared for removal from depth images.
 
-use super::locking::Locking;
+use std::f64::consts::TAU;
+
 use super::slopes::Noise;
 use super::uncertainty::Uncertainty;
 use crate::camera::{Camera, Rays};
 use crate::effects::{Active, Inverse};
 use crate::error::Result;
 use crate::model::{self, NoiseModel, SigmaModel};
+use crate::stats::bisect;
 use crate::terms::{ANYWHERE, LearntTerm, Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
 
@@ -46,7 +48,8 @@ pub struct Correction {
     pub(crate) still_terms: Vec<Term>,
     /// Sum of these terms at each pixel, px; empty if there are none.
     still: Vec<f32>,
-    pub(crate) locking: Option<Locking>,
+    /// Amplitude of pixel locking, px; 0 without.
+    pub(crate) locking_px: f64,
     /// Whether whole columns have offsets that differ from image to image.
     pub(crate) column_steps: bool,
     /// Terms that depend on more than the pixel.
@@ -87,7 +90,7 @@ impl Correction {
             along_ray: Vec::new(),
             still_terms: Vec::new(),
             still: Vec::new(),
-            locking: None,
+            locking_px: 0.0,
             column_steps: false,
             terms: Vec::new(),
             needs: Needs::default(),
@@ -113,7 +116,7 @@ impl Correction {
             && self.drifts.is_empty()
             && self.along_ray.is_empty()
             && self.still.is_empty()
-            && self.locking.is_none()
+            && self.locking_px == 0.0
             && !self.column_steps
             && self.terms.is_empty()
     }
@@ -166,7 +169,7 @@ impl Correction {
         let along = self.along_ray.get(i).copied().map_or(1.0, f64::from);
         let still = self.still.get(i).copied().map_or(0.0, f64::from);
         let d = self.scale_px_m * factor * along / f64::from(z) - still;
-        self.locking.as_ref().map_or(d, |locking| locking.unlock(d))
+        if self.locking_px == 0.0 { d } else { unlocked(d, self.locking_px) }
     }
 
     fn add(&mut self, entry: &model::Effect) -> Result<()> {
@@ -206,13 +209,9 @@ impl Correction {
                 self.along_ray = self.ray_over_depth(share);
             }
             Some(Inverse::ColumnSteps) => self.column_steps = true,
-            Some(Inverse::Locking { amplitude_px }) => {
-                self.locking = Some(Locking::new(amplitude_px));
-            }
+            Some(Inverse::Locking { amplitude_px }) => self.locking_px = amplitude_px,
             None => {
-                let card = active.effect.card();
-                let term =
-                    active.effect.term(&|name| active.settings.named(card, name), &self.camera);
+                let term = active.effect.term(&active.settings, &self.camera);
                 match term.filter(is_predictable_variance) {
                     Some(term) => self.variance.push((term, ANYWHERE)),
                     None => self.unpredicted.push(entry.id.clone()),
@@ -249,6 +248,13 @@ impl Correction {
             self.still = (0..self.camera.pixels()).map(sum).collect();
         }
     }
+}
+
+/// The disparity that locks to this one, px. Above an amplitude of 1/(2 pi) px there are several; this is one.
+fn unlocked(locked: f64, amplitude_px: f64) -> f64 {
+    let bracket = [locked - amplitude_px, locked + amplitude_px];
+    let [low, high] = bisect(bracket, |d| d - amplitude_px * (TAU * d).sin() < locked);
+    0.5 * (low + high)
 }
 
 /// Whether a term changes the noise predictably from the image alone, without the board or its light.

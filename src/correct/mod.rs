@@ -10,7 +10,6 @@ mod correction;
 mod describe;
 mod files;
 mod invert;
-mod locking;
 mod raw;
 mod recording;
 mod rewrite;

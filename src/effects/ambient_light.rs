@@ -1,6 +1,6 @@
 //! Ambient light raises the background and the noise.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, PixelContext, ROOM_LUX, Term};
 
@@ -64,8 +64,8 @@ impl Effect for AmbientLight {
         vec![fit.estimate("ratio", &|b| fit.value(b, far).exp_m1() / excess)]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(room(known("ratio")?), vec![1.0]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::variance(room(settings.at(0)), vec![1.0]))
     }
 }
 

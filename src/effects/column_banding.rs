@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_2_PI, TAU};
 
 use rand::Rng;
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Scope, Settings, Smallest, Stage, greatest};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Parameter, Scope, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
@@ -99,9 +99,9 @@ impl Effect for ColumnBanding {
         vec![amplitude, Estimate::given("period_px", period_px, std_error)]
     }
 
-    fn term(&self, known: Known, camera: &Camera) -> Option<Term> {
-        let (amplitude, period) = (known("amplitude_px")?, known("period_px")?);
-        if known("spread").is_some_and(|spread| spread > 1.0) {
+    fn term(&self, settings: &Settings, camera: &Camera) -> Option<Term> {
+        let [amplitude, period, spread] = [0, 1, 2].map(|k| settings.at(k));
+        if spread > 1.0 {
             return None;
         }
         let nodes = camera.width.max(2);
@@ -117,8 +117,7 @@ impl Effect for ColumnBanding {
     }
 
     fn inverse(&self, settings: &Settings, camera: &Camera) -> Option<Inverse> {
-        let term = self.term(&|name| settings.named(&CARD, name), camera);
-        Some(term.map_or(Inverse::ColumnSteps, Inverse::Term))
+        Some(self.term(settings, camera).map_or(Inverse::ColumnSteps, Inverse::Term))
     }
 
     fn smallest(&self, bounds: &Bounds) -> Option<Smallest> {

@@ -1,6 +1,6 @@
 //! A dark surface is noisier.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Known, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::scene::WHITE;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
@@ -61,8 +61,8 @@ impl Effect for IntensityDependentNoise {
         vec![fit.estimate("exponent", &|b| -0.5 * b[0])]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(dark(1, false), vec![-2.0 * known("exponent")?]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::variance(dark(1, false), vec![-2.0 * settings.at(0)]))
     }
 }
 

@@ -20,7 +20,7 @@ pub use draw::{Draw, Scope, fill_normal, logistic};
 pub use exposure::{Exposure, Instant};
 pub use fitted::{Estimate, Fitted};
 pub use range_not_depth::RAY_FOR_DEPTH;
-pub use traces::{Bounds, Flat, Inverse, Known, Smallest};
+pub use traces::{Bounds, Flat, Inverse, Smallest};
 
 use crate::camera::Camera;
 pub use crate::terms::ROOM_LUX;
@@ -63,14 +63,14 @@ pub trait Effect: Carded + Send + Sync {
         Vec::new()
     }
 
-    /// The term for known parameters, if the effect is one.
-    fn term(&self, _: Known, _: &Camera) -> Option<Term> {
+    /// The term of an effect of these parameters, if it is one.
+    fn term(&self, _: &Settings, _: &Camera) -> Option<Term> {
         None
     }
 
     /// What removes the effect from a depth image; `None` for what is no bias of the sensor.
     fn inverse(&self, settings: &Settings, camera: &Camera) -> Option<Inverse> {
-        let term = self.term(&|name| settings.named(self.card(), name), camera)?;
+        let term = self.term(settings, camera)?;
         term.is_sensor_bias().then_some(Inverse::Term(term))
     }
 

@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Known, Parameter, Settings, Smallest, Stage, greatest};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Inverse, Parameter, Settings, Smallest, Stage, greatest};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, PixelContext, Term};
@@ -63,8 +63,8 @@ impl Effect for PixelLocking {
         ]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::bias(waves(1.0, 1), vec![-known("amplitude_px")?, 0.0]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::bias(waves(1.0, 1), vec![-settings.at(0), 0.0]))
     }
 
     fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {

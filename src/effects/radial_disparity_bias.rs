@@ -1,6 +1,6 @@
 //! A bowl in disparity.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage, slope_in_square};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Smallest, Stage, slope_in_square};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Term};
@@ -59,8 +59,8 @@ impl Effect for RadialDisparityBias {
         ]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::bias(bowl(0.0, 1), vec![known("k_px")?]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::bias(bowl(0.0, 1), vec![settings.at(0)]))
     }
 
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {

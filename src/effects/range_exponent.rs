@@ -1,6 +1,6 @@
 //! Noise grows with another power of z.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
@@ -46,8 +46,8 @@ impl Effect for RangeExponent {
         })]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(power_law(), vec![2.0 * known("excess")?]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::variance(power_law(), vec![2.0 * settings.at(0)]))
     }
 
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {

@@ -1,6 +1,6 @@
 //! The file holds the ray length instead of the depth.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Known, Parameter, Settings, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Flat, Inverse, Parameter, Settings, Stage};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
@@ -53,8 +53,8 @@ impl Effect for RangeNotDepth {
         vec![fit.estimate("share", &|b| b[0])]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::bias(RAY_FOR_DEPTH, vec![known("share").unwrap_or(1.0)]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::bias(RAY_FOR_DEPTH, vec![settings.at(0)]))
     }
 
     fn inverse(&self, settings: &Settings, _: &Camera) -> Option<Inverse> {

@@ -1,6 +1,6 @@
 //! Lateral noise becomes depth noise on a slope.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
 use crate::sensors::SensorKind;
 use crate::terms::{Basis, Coordinate, Term};
@@ -60,8 +60,8 @@ impl Effect for SlopeNoise {
         vec![fit.estimate("sigma_lateral_px", &|b| lateral_px * doubled(b).sqrt())]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(blur(known("sigma_lateral_px")?), vec![1.0]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::variance(blur(settings.at(0)), vec![1.0]))
     }
 
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {

@@ -1,6 +1,6 @@
 //! Tilt along the baseline is noisier than tilt across it.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, Modulation, PixelContext, Term};
 
@@ -57,8 +57,8 @@ impl Effect for TiltAxisAnisotropy {
         vec![told]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        Some(Term::variance(along_baseline(FORWARD), vec![known("ratio")?.ln() / 0.75]))
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        Some(Term::variance(along_baseline(FORWARD), vec![settings.at(0).ln() / 0.75]))
     }
 
     fn smallest(&self, _: &Bounds) -> Option<Smallest> {

@@ -26,9 +26,6 @@ pub struct Flat {
     pub down: [f64; 2],
 }
 
-/// Parameters by name, as far as they are known.
-pub type Known<'a> = &'a dyn Fn(&str) -> Option<f64>;
-
 /// What undoes an effect in a depth image.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Inverse {

@@ -1,6 +1,6 @@
 //! Less light at the corners.
 
-use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Known, Parameter, Settings, Smallest, Stage};
+use super::{Bounds, Card, Draw, Effect, Estimate, Exposure, Fitted, Parameter, Settings, Smallest, Stage};
 use crate::camera::Camera;
 use crate::terms::{Basis, Coordinate, Modulation, Term};
 
@@ -47,8 +47,8 @@ impl Effect for Vignetting {
         vec![fit.estimate("growth", &|b| (0.5 * b.iter().sum::<f64>()).exp() - 1.0)]
     }
 
-    fn term(&self, known: Known, _: &Camera) -> Option<Term> {
-        let growth = known("growth")?;
+    fn term(&self, settings: &Settings, _: &Camera) -> Option<Term> {
+        let growth = settings.at(0);
         let nodes = 33;
         let values = (0..nodes)
             .map(|k| 2.0 * (growth * (k as f64 / (nodes - 1) as f64).powi(2)).ln_1p())

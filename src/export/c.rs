@@ -74,9 +74,6 @@ fn array(name: &str, numbers: &[f64]) -> String {
 
 fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> String {
     let camera = &correction.camera;
-    let locking = correction.locking.as_ref();
-    let (locking_px, unlocking) =
-        locking.map_or((0.0, &[][..]), |l| (l.amplitude_px(), l.shifts()));
     let (units, offset, slope, raw) = match sensor.code {
         DepthCode::Metric { units_per_metre, .. } => (units_per_metre, 0.0, 1.0, 0),
         DepthCode::Disparity { offset, slope, .. } => (1.0, offset, slope, 1),
@@ -85,7 +82,6 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
         ("WIDTH", camera.width),
         ("HEIGHT", camera.height),
         ("DRIFTS", correction.drifts.len()),
-        ("UNLOCKING", unlocking.len()),
         ("BIAS_TERMS", program.bias.len()),
         ("VARIANCE_TERMS", program.variance.len()),
         ("NEEDS_DEPTH", usize::from(correction.needs.depth)),
@@ -102,7 +98,7 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
         ("room_lux", ROOM_LUX),
         ("scale", correction.scale),
         ("ray_share", correction.ray_share),
-        ("locking_px", locking_px),
+        ("locking_px", correction.locking_px),
         ("units_per_metre", units),
         ("raw_offset", offset),
         ("raw_slope", slope),
@@ -121,7 +117,6 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
     for (name, numbers) in [
         ("distortion", &camera.distortion.unwrap_or_default()[..]),
         ("drifts", &drifts),
-        ("unlocking", unlocking),
         ("window_limits", correction.noise.limits()),
     ] {
         text.push_str(&array(&format!("{PREFIX}{name}"), numbers));

@@ -80,9 +80,6 @@ fn constants(sensor: &Sensor, correction: &Correction) -> String {
     };
     let drift = |d: &Drift| format!("({}, {})", number(d.relative), number(d.time_constant_s));
     let drifts: Vec<String> = correction.drifts.iter().map(drift).collect();
-    let locking = correction.locking.as_ref();
-    let (locking_px, unlocking) =
-        locking.map_or((0.0, &[][..]), |l| (l.amplitude_px(), l.shifts()));
     let python = |on: bool| if on { "True" } else { "False" }.to_string();
     let lines = [
         ("fx", number(camera.fx)),
@@ -98,8 +95,7 @@ fn constants(sensor: &Sensor, correction: &Correction) -> String {
         ("scale", number(correction.scale)),
         ("drifts", format!("[{}]", drifts.join(", "))),
         ("ray_share", number(correction.ray_share)),
-        ("locking_px", number(locking_px)),
-        ("unlocking", format!("np.array([\n    {}\n])", listed(unlocking))),
+        ("locking_px", number(correction.locking_px)),
         ("window_limits", format!("np.array([\n    {}\n])", listed(correction.noise.limits()))),
         ("needs_depth", python(correction.needs.depth)),
         ("needs_slope", python(correction.needs.slope)),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::camera::Camera;
-use crate::effects::{self, RAY_FOR_DEPTH};
+use crate::effects::{Active, RAY_FOR_DEPTH};
 use crate::model::{Covariance, Effect, NoiseModel, UNEXPLAINED};
 use crate::stats::mean;
 use crate::terms::{ANYWHERE, Axis, Basis, LearntTerm, Statistic, Term, by_term};
@@ -20,24 +20,27 @@ pub struct KnownTerms {
 
 impl KnownTerms {
     pub fn of(model: &NoiseModel, camera: &Camera) -> Self {
-        let mut known = KnownTerms { effects: model.effects.clone(), ..KnownTerms::default() };
+        let mut known = KnownTerms::default();
         for effect in &model.effects {
-            let simple;
-            let terms: &[Term] = if effect.shape.is_empty() {
-                let known = |name: &str| effect.number(name);
-                simple = effects::find(&effect.id).and_then(|e| e.term(&known, camera));
-                simple.as_slice()
-            } else {
-                &effect.shape
-            };
+            let mut effect = effect.clone();
+            let formula = Active::from_model(&effect).ok().filter(|_| effect.shape.is_empty());
+            let term = formula.as_ref().and_then(|f| f.effect.term(&f.settings, camera));
+            if let Some(Active { effect: formula, settings }) = &formula {
+                // What the entry leaves out is typical, as it is simulated and corrected.
+                for (k, parameter) in formula.card().parameters.iter().enumerate() {
+                    let stated = effect.parameters.entry(parameter.name);
+                    stated.or_insert_with(|| settings.at(k).into());
+                }
+            }
             let learnt = effect.learnt_px.unwrap_or(ANYWHERE);
-            for term in terms {
+            for term in effect.shape.iter().chain(&term) {
                 match term.statistic {
                     Statistic::Bias => known.bias.push((term.clone(), learnt)),
                     Statistic::Variance => known.variance.push(term.clone()),
                     _ => {}
                 }
             }
+            known.effects.push(effect);
         }
         known
     }

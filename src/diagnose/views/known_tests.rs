@@ -54,6 +54,20 @@ fn what_is_known_is_told_with_the_same_numbers() {
     }
 }
 
+/// An entry without numbers is simulated and corrected with the card's typical ones.
+#[test]
+fn what_an_entry_leaves_out_is_typical() {
+    let camera = kinect_v1(1).camera;
+    let of = |id, parameters| KnownTerms::of(&model(id, parameters), &camera);
+    let (without, with) =
+        (of("radial-disparity-bias", json!({})), of("radial-disparity-bias", json!({"k_px": 0.5})));
+    assert_eq!(without.bias, with.bias);
+    assert!(
+        without.bias.len() == 1 && without.parameter("radial-disparity-bias", "k_px") == Some(0.5)
+    );
+    assert_eq!(of("depth-scale", json!({})).law("depth-scale"), Some(1.0 - 1.0 / 1.035));
+}
+
 /// The card's parameter: growth of the noise at the corner radius.
 #[test]
 fn known_vignetting_grows_as_the_catalogue_says() {
