@@ -136,26 +136,7 @@ pub fn find(id: &str) -> Option<&'static dyn Effect> {
     CATALOGUE.iter().copied().find(|e| e.card().id == id)
 }
 
-/// Order in which a diagnosis tries the cards' axes: it decides ties, and which random numbers the null
-/// distribution of each candidate draws.
-const TRIED: [&str; 9] = [
-    "z",
-    "radius",
-    "theta",
-    "azimuth",
-    "target-position",
-    "disparity-phase",
-    "column",
-    "edge-distance",
-    "intensity",
-];
-
-/// The effects that change this statistic, in the order in which they are tried.
-pub fn that_change(statistic: Statistic) -> Vec<&'static dyn Effect> {
-    let mut all: Vec<&dyn Effect> =
-        CATALOGUE.iter().copied().filter(|e| e.card().statistic == statistic.id()).collect();
-    all.sort_by_key(|e| {
-        TRIED.iter().position(|axis| *axis == e.card().axis).unwrap_or(TRIED.len())
-    });
-    all
+/// The effects that change this statistic.
+pub fn that_change(statistic: Statistic) -> impl Iterator<Item = &'static dyn Effect> {
+    CATALOGUE.iter().copied().filter(move |e| e.card().statistic == statistic.id())
 }

@@ -3,6 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use nalgebra::Complex;
+
 use super::coordinate::Coordinate;
 use super::modulation::Modulation;
 use super::place::PixelContext;
@@ -52,36 +54,20 @@ pub(super) fn waves(
     p: &PixelContext,
     mut see: impl FnMut(usize, f64),
 ) {
-    let first = Turn::by(over.value(p) / period);
+    let first = turned(over.value(p) / period);
     let mut turn = first;
     let mut seen = seen(over, period, p);
     for k in 0..harmonics {
         let size = scale * seen();
-        see(2 * k, size * turn.sine);
-        see(2 * k + 1, size * turn.cosine);
-        turn = turn.and(first);
+        see(2 * k, size * turn.im);
+        see(2 * k + 1, size * turn.re);
+        turn *= first;
     }
 }
 
-/// Sine and cosine of an angle, from which those of its multiples follow.
-#[derive(Clone, Copy)]
-struct Turn {
-    sine: f64,
-    cosine: f64,
-}
-
-impl Turn {
-    fn by(cycles: f64) -> Self {
-        let (sine, cosine) = (TAU * cycles).sin_cos();
-        Turn { sine, cosine }
-    }
-
-    fn and(self, other: Self) -> Self {
-        Turn {
-            sine: self.sine * other.cosine + self.cosine * other.sine,
-            cosine: self.cosine * other.cosine - self.sine * other.sine,
-        }
-    }
+/// Cosine and sine of an angle; its powers are those of the angle's multiples.
+fn turned(cycles: f64) -> Complex<f64> {
+    Complex::cis(TAU * cycles)
 }
 
 /// Unit of the columns of stripes, px, to be divided by their order: bands are this large, and the waves of a
@@ -109,12 +95,12 @@ fn seen(over: Coordinate, period: f64, p: &PixelContext) -> impl FnMut() -> f64 
 fn sincs(cycles: f64) -> impl FnMut() -> f64 {
     const NOTHING: f64 = 1e-6;
     let x = PI * cycles;
-    let first = if x.abs() < NOTHING { Turn::by(0.0) } else { Turn::by(0.5 * cycles) };
+    let first = if x.abs() < NOTHING { turned(0.0) } else { turned(0.5 * cycles) };
     let (mut turn, mut order) = (first, 0.0);
     move || {
         order += 1.0;
-        let mean = if x.abs() < NOTHING { 1.0 } else { turn.sine / (order * x) };
-        turn = turn.and(first);
+        let mean = if x.abs() < NOTHING { 1.0 } else { turn.im / (order * x) };
+        turn *= first;
         mean
     }
 }

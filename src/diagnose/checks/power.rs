@@ -133,7 +133,7 @@ impl Case<'_> {
         let mut all = Vec::new();
         for gates in [&of_mean, &of_size] {
             let statistic = gates.scene.statistic;
-            let can = effects::that_change(statistic).into_iter();
+            let can = effects::that_change(statistic);
             for effect in can.filter(|e| e.card().applies_to(bounds.kind)) {
                 let Some(Smallest { parameter, shape, unit, of }) = effect.smallest(&bounds) else {
                     continue;

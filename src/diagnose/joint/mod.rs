@@ -210,15 +210,8 @@ impl Joint<'_> {
         }
         if s.penalty.is_some() {
             for (basis, gain) in self.columns.rest().zip([s.maps, 0.0, 0.0]) {
-                chosen.push(Chosen {
-                    candidate: Candidate::curve(basis),
-                    rms: 0.0,
-                    adequacy: 0.0,
-                    gain,
-                    best_curve: gain,
-                    rivals: Vec::new(),
-                    p: s.maps_p,
-                });
+                let map = Chosen::of(Candidate::curve(basis));
+                chosen.push(Chosen { gain, best_curve: gain, p: s.maps_p, ..map });
             }
         }
         chosen

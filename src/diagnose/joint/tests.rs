@@ -59,15 +59,8 @@ pub(super) fn session(
 }
 
 pub(super) fn term(family: Option<&'static str>, basis: Basis) -> Chosen {
-    Chosen {
-        candidate: Candidate { family, basis, flat: None },
-        rms: 0.1,
-        adequacy: 0.6,
-        gain: 1.0,
-        best_curve: 1.0,
-        rivals: Vec::new(),
-        p: 0.0,
-    }
+    let candidate = Candidate { family, basis, flat: None };
+    Chosen { rms: 0.1, adequacy: 0.6, gain: 1.0, best_curve: 1.0, p: 0.0, ..Chosen::of(candidate) }
 }
 
 pub(super) fn fitted(data: &[ViewData], chosen: Vec<Chosen>) -> Outcome {

@@ -44,7 +44,7 @@ impl Candidate {
             effect.shapes(bounds).into_iter().map(named)
         };
         let can = |e: &&'static dyn Effect| e.card().applies_to(bounds.kind);
-        effects::that_change(statistic).into_iter().filter(can).flat_map(of).collect()
+        effects::that_change(statistic).filter(can).flat_map(of).collect()
     }
 
     /// Whether it follows the disparity itself, which a time-of-flight camera does not have.

@@ -179,8 +179,7 @@ impl<'a> Layer<'a> {
     fn pin(&self, candidate: Candidate) -> Chosen {
         let alone = gain(&self.together.evidence(&[&candidate.basis]), self.rules.prior);
         let gain = alone.map_or(0.0, |g| g.total);
-        let (adequacy, rivals) = (self.rules.adequacy, Vec::new());
-        Chosen { candidate, rms: 0.0, adequacy, gain, best_curve: 0.0, rivals, p: 1.0 }
+        Chosen { gain, adequacy: self.rules.adequacy, ..Chosen::of(candidate) }
     }
 
     /// Sets up a trial of candidates given `chosen` and the pinned term.

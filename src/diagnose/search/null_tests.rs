@@ -3,6 +3,7 @@
 use super::*;
 use crate::diagnose::search::evidence::gain;
 use crate::diagnose::search::evidence::tests::{View, normal};
+use crate::diagnose::search::tests::RULES;
 use crate::diagnose::views::learnt::Learnt;
 use crate::rng::{Seed, Stream};
 
@@ -17,17 +18,7 @@ fn the_gain_for_so_many_nats_counts_for_as_many() {
         dispersion: 1.5,
         about_fit: 3.0,
     };
-    let rules = |learnt_from| Rules {
-        level: 0.01,
-        prior: 1.0,
-        adequacy: 0.6,
-        own_axis_adequacy: 0.0,
-        agreed: false,
-        max_terms: 1,
-        fixed: None,
-        calibrated: true,
-        learnt_from,
-    };
+    let rules = |learnt_from| Rules { learnt_from, ..RULES };
     let other = |searched| Some(Learnt { views: 20.0, searched });
     for (learnt_from, factor) in [(None, 0.99), (other(false), 2.0), (other(true), 4.0)] {
         let rules = rules(learnt_from);

@@ -36,6 +36,14 @@ pub struct Chosen {
     pub p: f64,
 }
 
+impl Chosen {
+    /// A term that has no rivals and is not tested.
+    pub fn of(candidate: Candidate) -> Self {
+        let (rms, adequacy, gain, best_curve) = (0.0, 0.0, 0.0, 0.0);
+        Chosen { candidate, rms, adequacy, gain, best_curve, rivals: Vec::new(), p: 1.0 }
+    }
+}
+
 /// Fit of a single nameless curve before any term is chosen.
 #[derive(Debug, Clone)]
 pub struct Look {

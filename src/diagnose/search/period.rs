@@ -99,15 +99,7 @@ mod tests {
                 0.5 * beta.dot(&(covariance.try_inverse().unwrap() * &beta))
             };
             let candidate = stripes(half_cycles.round() as u32);
-            let mut next = Chosen {
-                candidate,
-                rms: 0.0,
-                adequacy: 0.0,
-                gain: 0.0,
-                best_curve: 0.0,
-                rivals: Vec::new(),
-                p: 1.0,
-            };
+            let mut next = Chosen::of(candidate);
             let bracket = neighbours(&candidates, &next.candidate).expect("several periods");
             tune(bracket, &mut next, total);
             let (beta, covariance) = fit(&next.candidate.basis, &means);

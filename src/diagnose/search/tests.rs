@@ -270,22 +270,6 @@ fn a_lift_that_planes_take_up_is_none() {
     assert!((bend / (0.01 * 2.0 / 3.0) - 1.0).abs() < 0.25, "a bent board: {bend}");
 }
 
-/// Same seed, same search, on one thread and two.
-#[test]
-fn a_search_repeats() {
-    let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            let mut rng = Seed(8).stream("search/repeat");
-            let outcome = found(&session(&mut rng, |p| p.radius * p.radius), 8);
-            (families(&outcome), outcome.coefficients(0), outcome.chosen[0].p)
-        })
-    };
-    let one = run(1);
-    assert_eq!(one, run(2));
-    assert_eq!(one, run(2));
-}
-
 /// One of the terms cannot be fitted, wherever it stands.
 #[test]
 fn terms_that_cannot_be_fitted_are_not_told() {

@@ -5,14 +5,12 @@ use crate::camera::Camera;
 use crate::effects::Bounds;
 use crate::model::SigmaModel;
 use crate::sensors::SensorKind;
-use crate::terms::{Axis, Basis, Coordinate, Extent, Modulation, Statistic, TABLE, Term};
+use crate::terms::{Basis, Coordinate, Extent, Modulation, Statistic, TABLE, Term};
 
 /// Candidates from the catalogue, changes of sigma itself, and nameless curves.
 pub fn candidates(bounds: &Bounds, sigma: &SigmaModel) -> Vec<Candidate> {
     let mut all = Candidate::of_catalogue(Statistic::Variance, bounds);
-    // After shapes over depth or radius.
-    let first = |c: &Candidate| matches!(c.basis.axis(), Axis::Z | Axis::Radius);
-    all.insert(all.partition_point(first), Candidate::named(RECALIBRATE, Basis::Level));
+    all.push(Candidate::named(RECALIBRATE, Basis::Level));
     all.extend(recalibrations(bounds.reach, sigma));
     all.extend(surfaces(bounds.reach));
     all.extend(curves(bounds.camera, bounds.reach));

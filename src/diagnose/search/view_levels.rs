@@ -22,7 +22,7 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
         // The chance difference of two runs may follow any law of the distance.
         _ if tolerance > MODEL_TOLERANCE => &[&LAWS[..1]],
         12.. => &[&LAWS],
-        10.. => &[&LAWS[..4], &[Law::Level, Law::Distance, Law::Time, Law::Warmth]],
+        10.. => &[&LAWS[..4], &[LAWS[0], LAWS[1], LAWS[4], LAWS[5]]],
         9.. => &[&LAWS[..4]],
         _ => &[&LAWS[..2]],
     };
@@ -89,46 +89,30 @@ impl<'a> Level<'a> {
     }
 }
 
-/// Laws that a view's noise level may follow.
-#[derive(Clone, Copy)]
-enum Law {
-    Level,
-    Distance,
-    Tilt,
-    /// Noise along and across the pattern.
-    Turn,
-    Time,
-    Warmth,
-    /// Ambient light over the pattern's, which falls with the square of the distance.
-    Ambient,
-}
+/// A law that a view's noise level may follow.
+type Law = fn(&PixelContext) -> f64;
 
-const LAWS: [Law; 7] =
-    [Law::Level, Law::Distance, Law::Tilt, Law::Turn, Law::Time, Law::Warmth, Law::Ambient];
-
-impl Law {
-    fn at(self, place: &PixelContext) -> f64 {
-        let steep = place.theta.sin().powi(2);
-        match self {
-            Law::Level => 1.0,
-            Law::Distance => place.z.ln(),
-            Law::Tilt => steep,
-            Law::Turn => steep * (2.0 * place.azimuth).cos(),
-            Law::Time => finite(place.session_s / 3600.0),
-            Law::Warmth => finite(place.temperature_c / 10.0),
-            Law::Ambient => finite(place.ambient * place.pattern_fall_off() / ROOM_LUX),
-        }
-    }
-}
+/// Level, distance, tilt, direction of the tilt (noise along and across the pattern), time, temperature, and
+/// ambient light over the pattern's, which falls with the square of the distance.
+const LAWS: [Law; 7] = [
+    |_| 1.0,
+    |p| p.z.ln(),
+    |p| p.theta.sin().powi(2),
+    |p| p.theta.sin().powi(2) * (2.0 * p.azimuth).cos(),
+    |p| finite(p.session_s / 3600.0),
+    |p| finite(p.temperature_c / 10.0),
+    |p| finite(p.ambient * p.pattern_fall_off() / ROOM_LUX),
+];
 
 fn laws(levels: &[Level<'_>], among: &[Law]) -> DMatrix<f64> {
     // With the same light in all views, a law of the light is one of the distance.
     let [dim, bright] = range(levels.iter().map(|l| l.place.ambient));
-    let at = |law: Law, place: &PixelContext| match law {
-        Law::Ambient if bright <= dim => 0.0,
-        _ => law.at(place),
+    let place = |l: &Level<'_>| match bright > dim {
+        true => *l.place,
+        false => PixelContext { ambient: 0.0, ..*l.place },
     };
-    DMatrix::from_fn(levels.len(), among.len(), |i, k| at(among[k], levels[i].place))
+    let places: Vec<PixelContext> = levels.iter().map(place).collect();
+    DMatrix::from_fn(levels.len(), among.len(), |i, k| among[k](&places[i]))
 }
 
 fn heights(levels: &[Level<'_>]) -> DVector<f64> {
