@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::source::{Arrival, End, LiveFrame, Source};
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::io::{Assumed, FrameSource, InfraredImage, open_uncut};
+use crate::io::{Assumed, FrameSource, open_uncut, read_infrared};
 use crate::view::{FrameRef, Sensor};
 
 /// Longer pauses between frames (a board being moved) are cut to this, s.
@@ -54,10 +54,8 @@ impl Playback {
 
     /// Infrared image of the depth frame's size; `None`, with a remark, if it cannot be read.
     fn amplitude(&mut self, path: &Path, depth: &Frame) -> Option<Frame> {
-        match InfraredImage::read(path, [depth.width, depth.height]) {
-            Ok(InfraredImage { width, height, amplitude }) => {
-                Some(Frame { width, height, raw: amplitude })
-            }
+        match read_infrared(path, [depth.width, depth.height]) {
+            Ok(image) => Some(image),
             Err(why) => {
                 self.remarks.push(format!("infrared left out: {why}"));
                 None

@@ -24,7 +24,7 @@ pub use list::{FrameList, read_list};
 pub(crate) use output::{by_number, entries, sync_folder, write_atomic_with};
 pub use output::{hex, pretty_json, refuse_full, sha256_hex, write_atomic, write_json};
 pub use output_folder::{Leaves, OutputFolder, refuse_inside, refuse_nested, settled};
-pub use pictures::{ColourImage, InfraredImage};
+pub use pictures::{ColourImage, read_infrared};
 pub(crate) use unfinished::lock;
 pub use unfinished::{Interrupted, discard_stale, discard_unfinished};
 

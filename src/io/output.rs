@@ -189,22 +189,12 @@ mod tests {
     }
 
     #[test]
-    fn json_ends_with_a_line_and_reads_back() {
+    fn what_json_cannot_hold_leaves_the_old_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.json");
         let text = write_json(&path, &[1.5, 2.0], "").unwrap();
-        assert_eq!(text, "[\n  1.5,\n  2.0\n]\n");
-        assert_eq!(fs::read_to_string(&path).unwrap(), text);
         let not_a_key = std::collections::BTreeMap::from([([1, 2], 3)]);
         assert!(write_json(&path, &not_a_key, "name it").is_err());
-        assert_eq!(fs::read_to_string(&path).unwrap(), text, "the old file stands");
-    }
-
-    #[test]
-    fn the_hash_is_the_standard_one() {
-        assert_eq!(
-            sha256_hex(b"abc"),
-            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
-        );
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use image::ImageDecoder;
 
 use crate::error::{Error, Result};
+use crate::frame::Frame;
 use crate::read::open;
 
 /// A colour image from a PNG or JPEG: red, green, blue, row-major.
@@ -47,33 +48,23 @@ fn decode_of_size(
     image::DynamicImage::from_decoder(decoder).map_err(damaged)
 }
 
-/// Infrared amplitude from an 8- or 16-bit image.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InfraredImage {
-    pub width: usize,
-    pub height: usize,
-    /// Row-major, in the image's own units.
-    pub amplitude: Vec<u16>,
-}
-
-impl InfraredImage {
-    /// Reads one image of the depth image's `size`, width and height, px.
-    /// Fails if the file is not a whole grey PNG of 8 or 16 bits and that size.
-    pub fn read(path: &Path, size: [usize; 2]) -> Result<Self> {
-        let remedy = "infrared must be a grey PNG of the depth's size";
-        let amplitude = match decode_of_size(path, "infrared", size, remedy)? {
-            image::DynamicImage::ImageLuma8(grey) => {
-                grey.into_raw().into_iter().map(u16::from).collect()
-            }
-            image::DynamicImage::ImageLuma16(grey) => grey.into_raw(),
-            other => {
-                return Err(Error::recording(
-                    path,
-                    format!("{:?} image", other.color()),
-                    "infrared must be a grey PNG of 8 or 16 bits",
-                ));
-            }
-        };
-        Ok(InfraredImage { width: size[0], height: size[1], amplitude })
-    }
+/// Reads one infrared image of the depth image's `size`, width and height, px: amplitudes in the image's own
+/// units.
+/// Fails if the file is not a whole grey PNG of 8 or 16 bits and that size.
+pub fn read_infrared(path: &Path, size: [usize; 2]) -> Result<Frame> {
+    let remedy = "infrared must be a grey PNG of the depth's size";
+    let raw = match decode_of_size(path, "infrared", size, remedy)? {
+        image::DynamicImage::ImageLuma8(grey) => {
+            grey.into_raw().into_iter().map(u16::from).collect()
+        }
+        image::DynamicImage::ImageLuma16(grey) => grey.into_raw(),
+        other => {
+            return Err(Error::recording(
+                path,
+                format!("{:?} image", other.color()),
+                "infrared must be a grey PNG of 8 or 16 bits",
+            ));
+        }
+    };
+    Ok(Frame { width: size[0], height: size[1], raw })
 }

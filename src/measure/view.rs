@@ -8,7 +8,7 @@ use super::scan::Scan;
 use super::{ViewMeasurement, Workbench};
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::io::InfraredImage;
+use crate::io::read_infrared;
 use crate::plane::{Points, RansacOptions, RansacPlane, Target, ransac_plane};
 use crate::view::{Excluded, Recording, View, take_out_copies};
 
@@ -118,10 +118,10 @@ fn infrared_of(
 ) -> Option<f64> {
     for frame in &view.infrared {
         let camera = &bench.sensor.camera;
-        match InfraredImage::read(&frame.path, [camera.width, camera.height]) {
+        match read_infrared(&frame.path, [camera.width, camera.height]) {
             Ok(image) => {
                 let sum: f64 =
-                    target.pixels.iter().map(|&i| f64::from(image.amplitude[i as usize])).sum();
+                    target.pixels.iter().map(|&i| f64::from(image.raw[i as usize])).sum();
                 return Some(sum / target.pixels.len() as f64);
             }
             Err(e) => notes.push(format!("infrared left out: {e}")),

@@ -254,10 +254,10 @@ fn a_units_own_serial_calibration_and_infrared_are_recorded() {
     assert_eq!((view.depth.len(), view.infrared.len()), (4, 4));
     assert_eq!(view.depth[0].timestamp, view.infrared[0].timestamp);
     let infrared =
-        kinoise::io::InfraredImage::read(&view.infrared[0].path, [640, 480]).expect("an image");
+        kinoise::io::read_infrared(&view.infrared[0].path, [640, 480]).expect("an image");
     assert_eq!((infrared.width, infrared.height), (640, 480));
     // The middle 480 of 488 rows; every row holds its number.
-    assert_eq!((infrared.amplitude[0], infrared.amplitude[640 * 479]), (4, 483));
+    assert_eq!((infrared.raw[0], infrared.raw[640 * 479]), (4, 483));
     let now = recording.views[0].depth[0].timestamp;
     assert!(now > 1.7e9, "seconds since 1970: {now}");
 }

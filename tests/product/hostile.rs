@@ -298,14 +298,14 @@ fn images_of_another_size_are_not_unpacked() {
     let pixels = vec![0; (size * size) as usize];
     let bomb = desk.at("bomb.png");
     write_png(&bomb, (size, size), png::ColorType::Grayscale, png::BitDepth::Eight, &pixels);
-    let read = kinoise::io::InfraredImage::read(&bomb, [160, 120]).expect_err("another size");
+    let read = kinoise::io::read_infrared(&bomb, [160, 120]).expect_err("another size");
     assert!(read.to_string().contains("4000 x 4000 px, the depth 160 x 120"), "{read}");
     let read = kinoise::io::ColourImage::read(&bomb, [160, 120]).expect_err("another size");
     assert!(read.to_string().contains("4000 x 4000 px, the depth 160 x 120"), "{read}");
     // The header suffices: almost all pixels are cut off.
     let bytes = fs::read(&bomb).expect("read");
     fs::write(&bomb, &bytes[..60]).expect("written");
-    let read = kinoise::io::InfraredImage::read(&bomb, [160, 120]).expect_err("another size");
+    let read = kinoise::io::read_infrared(&bomb, [160, 120]).expect_err("another size");
     assert!(read.to_string().contains("4000 x 4000 px"), "{read}");
 }
 

@@ -227,6 +227,7 @@ fn a_camera_that_cannot_be_meant_is_refused_by_every_command() {
         ("145,79.5,145,59.5", "differ by more than a quarter"),
         ("145,145,79.5,-3", "outside the image"),
         ("0.9,0.9,79.5,59.5", "field of view of 178.7"),
+        ("14500,14500,79.5,59.5", "field of view of 0.6"),
     ] {
         for line in [
             "calibrate png -o out",

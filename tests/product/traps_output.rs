@@ -111,7 +111,10 @@ fn what_others_wrote_is_not_overwritten() {
     fs::write(desk.at("thesis/chapter.tex"), "ten years").expect("written");
     fs::create_dir(desk.at("kept")).expect("made");
     fs::copy(desk.at("cal/model.json"), desk.at("kept/model.json")).expect("copied");
+    copy_tree(&desk.at("cal"), &desk.at("mixed"));
+    fs::write(desk.at("mixed/notes.txt"), "of mine").expect("written");
     for (line, holds) in [
+        ("calibrate rec -o mixed", "holds notes.txt"),
         ("calibrate rec -o dia", "diagnosis.json"),
         ("calibrate rec -o thesis", "chapter.tex"),
         ("calibrate rec -o kept", "model.json"),
@@ -171,6 +174,8 @@ fn nothing_is_written_into_an_input() {
     for line in ["map film -o film/map", "compare film -o film", "map film --force -o film"] {
         desk.refused(line, &["inside the recording that is read"]);
     }
+    // A name that only begins like the input's.
+    desk.done("calibrate rec -o recent");
     for line in [
         "diagnose rec --model cal/model.json -o cal --force",
         "calibrate cal/measurements.csv -o cal",

@@ -1,7 +1,8 @@
 //! The infrared amplitude at every pixel of a target.
 
 use crate::diagnose::options::FRAMES_KEPT;
-use crate::io::InfraredImage;
+use crate::frame::Frame;
+use crate::io::read_infrared;
 use crate::stats::{MAD_TO_SIGMA, median_in_place};
 use crate::view::View;
 
@@ -19,8 +20,8 @@ const MEDIAN_ERROR: f64 = 1.2533;
 /// clipped at zero. `None` without a readable image.
 pub fn amplitudes(view: &View, on_target: &[bool], width: usize) -> Option<Vec<f32>> {
     let height = on_target.len() / width.max(1);
-    let read = |f| InfraredImage::read(f, [width, height]).ok();
-    let images: Vec<InfraredImage> =
+    let read = |f| read_infrared(f, [width, height]).ok();
+    let images: Vec<Frame> =
         view.infrared.iter().filter_map(|f| read(&f.path)).take(FRAMES_KEPT).collect();
     let first = images.first()?;
     let mut near: Vec<u16> = Vec::new();
@@ -31,7 +32,7 @@ pub fn amplitudes(view: &View, on_target: &[bool], width: usize) -> Option<Vec<f
         for row in v.saturating_sub(LIGHT_REACH)..(v + LIGHT_REACH + 1).min(height) {
             let places = row * width + columns.start..row * width + columns.end;
             for (k, _) in places.clone().zip(&on_target[places]).filter(|(_, on)| **on) {
-                near.extend(images.iter().map(|image| image.amplitude[k]));
+                near.extend(images.iter().map(|image| image.raw[k]));
             }
         }
         let middle = near.len() / 2;
@@ -39,7 +40,7 @@ pub fn amplitudes(view: &View, on_target: &[bool], width: usize) -> Option<Vec<f
     };
     let pixels = || (0..on_target.len()).filter(|i| on_target[*i]);
     let medians: Vec<f32> = pixels().map(median).map(f32::from).collect();
-    let apart = pixels().zip(&medians).map(|(i, m)| (f32::from(first.amplitude[i]) - m).abs());
+    let apart = pixels().zip(&medians).map(|(i, m)| (f32::from(first.raw[i]) - m).abs());
     let noise = MAD_TO_SIGMA * f64::from(median_in_place(&mut apart.collect::<Vec<f32>>()));
     let readings = ((2 * LIGHT_REACH + 1).pow(2) * images.len()) as f64;
     let min = (SURE_LIGHT_ERRORS * MEDIAN_ERROR * noise / readings.sqrt()) as f32;
@@ -51,7 +52,6 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::frame::Frame;
     use crate::io::encode_png16;
     use crate::rng::Seed;
     use crate::view::{FrameRef, ViewNotes};

@@ -1,8 +1,8 @@
 //! Depth PNGs, infrared and colour, PGMs and the index of a dump.
 
 use kinoise::io::{
-    Assumed, ColourImage, FrameSource, InfraredImage, encode_pgm16, encode_png16_quickly,
-    open_uncut,
+    Assumed, ColourImage, FrameSource, encode_pgm16, encode_png16_quickly, open_uncut,
+    read_infrared,
 };
 
 use super::desk::{Desk, assumed, check, frame};
@@ -64,8 +64,8 @@ pub fn picture(data: &[u8]) -> bool {
     let [width, height] = size(&png).filter(small).unwrap_or([8, 6]);
     DESK.with(|desk| {
         let path = desk.put("picture", &png);
-        if let Ok(grey) = InfraredImage::read(&path, [width, height]) {
-            assert_eq!(grey.amplitude.len(), width * height);
+        if let Ok(grey) = read_infrared(&path, [width, height]) {
+            assert_eq!(grey.raw.len(), width * height);
         }
         let Ok(colour) = ColourImage::read(&path, [width, height]) else { return false };
         assert_eq!(colour.rgb.len(), 3 * width * height);
