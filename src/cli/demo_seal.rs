@@ -4,7 +4,7 @@ use kinoise::Seed;
 use kinoise::diagnose::{Diagnosis, Finding, Status, Verdict};
 use kinoise::effects::{Active, CATALOGUE, Card, Parameter};
 use kinoise::io::{hex, sha256_hex};
-use kinoise::units::{counted, shortest, to_digits};
+use kinoise::units::{shortest, to_digits};
 use rand::Rng;
 use serde_json::{Value, json};
 
@@ -73,7 +73,6 @@ impl Sealed {
         lines.push(answer.sentence(card, diagnosis));
         lines.extend(parameters.iter().map(|c| format!("  {}", c.sentence())));
         lines.extend(answer.wrong_names());
-        lines.push(gained(diagnosis));
         let json = json!({
             "sha256": self.hash(),
             "text": self.text,
@@ -211,31 +210,6 @@ const NORMAL_95: f64 = 1.96;
 
 fn digits(v: f64) -> String {
     shortest(to_digits(v, 3))
-}
-
-fn gained(diagnosis: &Diagnosis) -> String {
-    let Some(h) = &diagnosis.heldout else {
-        return "No view could be kept out to show a gain.".into();
-    };
-    if h.is_nothing() {
-        let none = diagnosis.has_no_score();
-        let what = if none { "what was found has no score" } else { "nothing is gained" };
-        return format!("On {} kept out of the fit {what}.", counted(h.views.len(), "view"));
-    }
-    let [low, high] = h.gain_interval;
-    let gain = format!(
-        "On {} kept out of the fit the extended model gains {:.1} nats a view (95 %: {low:.1} to {high:.1})",
-        counted(h.views.len(), "view"),
-        h.gain
-    );
-    let (before, after) = (h.correction_rms_before_px, h.correction_rms_after_px);
-    if (before - after).abs() < 5e-4 {
-        let none = h.bias_gain_interval == [0.0; 2];
-        return gain + if none { "; there is no bias to correct." } else { "." };
-    }
-    format!(
-        "{gain}; correction takes the error of a pixel from {before:.3} to {after:.3} px (rms)."
-    )
 }
 
 #[cfg(test)]

@@ -9,16 +9,16 @@ use kinoise::diagnose::{
 };
 use kinoise::effects::{Active, Instant};
 use kinoise::io::{Assumed, DESCRIPTION, OutputFolder, open, pretty_json};
-use kinoise::report::{DiagnosisPage, Step, diagnosis_page, story, subject};
+use kinoise::report::{DiagnosisPage, diagnosis_page, story, subject};
 use kinoise::simulate::{FormulaSensor, plan_on};
 use kinoise::view::ViewNotes;
 use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
 use super::common::{Global, Input, say_differences, source_date};
 use super::console::{
-    detail, detail_model, detail_recording, next_step, notes, one_line, result_lines, say, working,
+    detail, detail_model, detail_recording, notes, one_line, result_lines, say, working,
 };
-use super::diagnose_next::{After, NextStep};
+use super::diagnose_next::After;
 use super::origin::origin;
 use super::output::{DIAGNOSIS, begin};
 
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         input: &held.input,
     };
     after.reproductions(arguments.model.as_deref(), &model.effects).iter().for_each(say);
-    after.steps().iter().take(1).for_each(|step| next_step(&step.words));
+    after.steps().iter().take(1).for_each(|step| say(format!("next: {}", step.command)));
     let found = diagnosis.verdict == Verdict::Mismatch && !arguments.exit_zero;
     Ok(if found { FOUND } else { 0 })
 }
@@ -134,7 +134,7 @@ pub fn examine(
         let pictures = with_twins(&done, &recording.sensor, model, options.seed);
         let origin = &origin(&recording.root, options.seed.0);
         let after = After { diagnosis, recording: &recording.root, folder: out.place(), input };
-        let steps: Vec<Step> = after.steps().iter().map(NextStep::on_page).collect();
+        let steps = after.steps();
         let page =
             DiagnosisPage { title: &title, diagnosis, pictures: &pictures, steps: &steps, origin };
         out.write("report.html", diagnosis_page(&page)?.as_bytes())?;

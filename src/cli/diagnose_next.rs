@@ -21,26 +21,16 @@ pub struct After<'a> {
     pub input: &'a [OsString],
 }
 
-pub struct NextStep {
-    why: &'static str,
-    pub words: Vec<OsString>,
-}
-
-impl NextStep {
-    pub fn on_page(&self) -> Step {
-        Step { why: self.why.into(), command: format!("kinoise {}", shell(&self.words)) }
-    }
-}
-
 impl After<'_> {
     /// Next steps, in order.
-    pub fn steps(&self) -> Vec<NextStep> {
+    pub fn steps(&self) -> Vec<Step> {
         let model = ["-m".into(), self.folder.join("model.json").into()];
         let recording = || OsString::from(self.recording);
         let to = |what| OsString::from(beside(self.folder, what));
         let mut steps = Vec::new();
-        let mut step = |why, words: &[OsString], input: &[OsString]| {
-            steps.push(NextStep { why, words: [words, input].concat() });
+        let mut step = |why: &str, words: &[OsString], input: &[OsString]| {
+            let command = format!("kinoise {}", shell(&[words, input].concat()));
+            steps.push(Step { why: why.into(), command });
         };
         let has = |status| self.diagnosis.findings.iter().any(|f| f.status == status);
         let calibrate = ["calibrate".into(), recording(), "-o".into(), to("calibrated")];

@@ -1,16 +1,14 @@
 //! Figures 6 to 8 and the page of a comparison of mapping variants.
 
 use maud::{Markup, html};
-use nalgebra::Vector3;
 
 use super::chart::{Chart, Stroke};
-use super::colours::{self, INK};
+use super::colours;
 use super::document::{Origin, beside, document, figure, list, prose, section, table};
 use super::numbers::{ABSENT, MM, fixed};
-use super::trajectories::{AXES, Line, chart, longest_axes};
+use super::trajectories::{self, Estimate, Line, chart};
 use crate::compare::{Comparison, Row, Run, tables};
 use crate::error::Result;
-use crate::trajectory::Pose;
 
 /// Renders the page, one self-contained file with tables and figures.
 pub fn comparison_page(comparison: &Comparison, origin: &Origin) -> Result<String> {
@@ -71,24 +69,12 @@ fn drawn(comparison: &Comparison) -> impl Iterator<Item = (&Row, &Run)> {
 }
 
 fn paths(comparison: &Comparison) -> Chart {
-    let within = |stamp: f64| {
-        drawn(comparison).any(|(_, run)| {
-            let (first, last) = (run.trajectory.first(), run.trajectory.last());
-            first.is_some_and(|p| p.stamp <= stamp) && last.is_some_and(|p| p.stamp >= stamp)
-        })
-    };
-    let truth = comparison.truth.iter().filter(|p| within(p.stamp));
-    let truth: Vec<Vector3<f64>> = truth.map(|p| p.world_from_camera.translation.vector).collect();
-    let [i, j] = longest_axes(&truth);
-    let flat = |p: &Vector3<f64>| [p[i], p[j]];
-    let truth = truth.iter().map(flat).collect();
-    let mut paths = vec![("ground truth".into(), truth, Stroke::new(INK, 1))];
-    paths.extend(lines(comparison, |run| {
-        let aligned = run.evaluation.ate.truth_from_estimate;
-        let place = |p: &Pose| flat(&(aligned * p.world_from_camera).translation.vector);
-        run.trajectory.iter().map(place).collect()
-    }));
-    chart("Fig. 6. Paths, aligned", [AXES[i], AXES[j]], paths, true)
+    let estimates = drawn(comparison).enumerate().map(|(i, (row, run))| -> Estimate<'_> {
+        let stroke = Stroke::new(colours::line(i), 2);
+        (row.variant.name.into(), &run.trajectory, &run.evaluation, stroke)
+    });
+    let estimates: Vec<Estimate<'_>> = estimates.collect();
+    trajectories::paths("Fig. 6. Paths, aligned", &comparison.truth, &estimates)
 }
 
 fn over_time(comparison: &Comparison, title: &str, of: fn(&Run) -> &Vec<(f64, f64)>) -> Chart {

@@ -57,10 +57,10 @@ pub struct Against<'a> {
     pub delta: Delta,
 }
 
-pub(super) const AXES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
+const AXES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
 
 /// The two axes along which a path is longest, in order.
-pub(super) fn longest_axes(path: &[Vector3<f64>]) -> [usize; 2] {
+fn longest_axes(path: &[Vector3<f64>]) -> [usize; 2] {
     let length = |k: usize| {
         let [low, high] = range(path.iter().map(|p| p[k]));
         high - low
@@ -69,6 +69,29 @@ pub(super) fn longest_axes(path: &[Vector3<f64>]) -> [usize; 2] {
     axes.sort_by(|a, b| length(*b).total_cmp(&length(*a)));
     axes[..2].sort_unstable();
     [axes[0], axes[1]]
+}
+
+/// Name, poses in time order, evaluation and stroke of an estimated path.
+pub(super) type Estimate<'a> = (String, &'a [Pose], &'a Evaluation, Stroke);
+
+/// The true path while any estimate lasts, and the estimates aligned to it, in the plane of the two longest
+/// axes of the true path.
+pub(super) fn paths(title: &str, truth: &[Pose], estimates: &[Estimate<'_>]) -> Chart {
+    let spans: Vec<[f64; 2]> =
+        estimates.iter().map(|(_, poses, ..)| range(poses.iter().map(|p| p.stamp))).collect();
+    let within = |p: &&Pose| spans.iter().any(|[from, to]| (*from..=*to).contains(&p.stamp));
+    let place = |p: &Pose| p.world_from_camera.translation.vector;
+    let truth: Vec<Vector3<f64>> = truth.iter().filter(within).map(place).collect();
+    let [i, j] = longest_axes(&truth);
+    let flat = |p: Vector3<f64>| [p[i], p[j]];
+    let truth = truth.into_iter().map(flat).collect();
+    let mut lines = vec![("ground truth".into(), truth, Stroke::new(INK, 1))];
+    lines.extend(estimates.iter().map(|(name, poses, evaluation, stroke)| {
+        let aligned = evaluation.ate.truth_from_estimate;
+        let place = |p: &Pose| flat((aligned * p.world_from_camera).translation.vector);
+        (name.clone(), poses.iter().map(place).collect(), *stroke)
+    }));
+    chart(title, [AXES[i], AXES[j]], lines, true)
 }
 
 impl Against<'_> {
@@ -84,29 +107,13 @@ impl Against<'_> {
             chart.y = Axis::linear(0.0, chart.y.high);
             chart
         };
+        let stroke = Stroke::new(ACCENT, 2);
+        let estimate: Estimate<'_> = ("estimate, aligned".into(), self.estimate, e, stroke);
         [
-            ("paths.svg", self.paths()),
+            ("paths.svg", paths("Paths", self.truth, &[estimate])),
             ("ate.svg", over_time("Absolute trajectory error", &e.ate.each, line(0))),
             ("rpe.svg", over_time(&rpe, &e.rpe.each, line(1))),
         ]
-    }
-
-    /// Paths in the plane of the two longest axes of the true path.
-    fn paths(&self) -> Chart {
-        let stamps = range(self.estimate.iter().map(|p| p.stamp));
-        let within = |p: &&Pose| (stamps[0]..=stamps[1]).contains(&p.stamp);
-        let aligned = self.evaluation.ate.truth_from_estimate;
-        let place = |p: &Pose| p.world_from_camera.translation.vector;
-        let truth: Vec<Vector3<f64>> = self.truth.iter().filter(within).map(place).collect();
-        let [i, j] = longest_axes(&truth);
-        let flat = |p: Vector3<f64>| [p[i], p[j]];
-        let estimate =
-            self.estimate.iter().map(|p| flat((aligned * p.world_from_camera).translation.vector));
-        let lines = vec![
-            ("ground truth".into(), truth.iter().map(|p| flat(*p)).collect(), Stroke::new(INK, 1)),
-            ("estimate, aligned".into(), estimate.collect(), Stroke::new(ACCENT, 2)),
-        ];
-        chart("Paths", [AXES[i], AXES[j]], lines, true)
     }
 
     /// Error statistics as tiles and as a table, errors over time, and paths.

@@ -61,7 +61,13 @@ fn card((i, finding): (usize, &&Finding)) -> Result<Markup> {
                 } }
             }
             (alternatives(finding))
-            @if let Some(advice) = advice(finding) { div.todo { p { b { "What to do. " } (advice) } } }
+            div.todo { p {
+                b { "What to do. " }
+                @match &finding.next_view {
+                    Some(view) => (next_view(view)),
+                    None => (prose(&sentence(&table::advice(finding)))),
+                }
+            } }
         }
     })
 }
@@ -125,40 +131,6 @@ fn alternatives(finding: &Finding) -> Markup {
         p { b { "What it could be" } }
         (list(effects.chain(none)))
     } }
-}
-
-/// What to do next; `None` where there is nothing to do.
-fn advice(finding: &Finding) -> Option<Markup> {
-    let view = finding.next_view.as_ref();
-    let more = match finding.status {
-        Status::Named | Status::OneOf if view.is_some() => {
-            "Then diagnose again with this view added to the recording."
-        }
-        Status::Named => "",
-        Status::OneOf if finding.is_law() => {
-            "These references do not separate the alternatives. Measure more, near and far in turn from a cold start on, \
-             and diagnose again."
-        }
-        Status::OneOf => {
-            "These views do not separate the alternatives. Add views at other distances and tilts, and diagnose again."
-        }
-        Status::Unexplained => {
-            "The simulation can use the measured curve as it is. To find the cause, change one thing at a time \
-             (distance, tilt, place in the picture, light, time since switching on) and see what the curve follows."
-        }
-        Status::Recalibrate => {
-            "Run “kinoise calibrate” on this recording and diagnose again with the new model. No effect has to be \
-             added to the simulation."
-        }
-        Status::NotIdentifiable if view.is_none() && finding.statistic == Statistic::Bias => {
-            "A plane with this error still looks like a plane. Measure the distance from sensor to target with a tape \
-             in a few views at different distances, write it into each view's view.json as “reference_distance_m”, \
-             and diagnose again."
-        }
-        Status::NotIdentifiable => "Add views at other distances and tilts, and diagnose again.",
-    };
-    (view.is_some() || !more.is_empty())
-        .then(|| html! { @if let Some(view) = view { (next_view(view)) } (more) })
 }
 
 /// An instruction to the person holding the target.

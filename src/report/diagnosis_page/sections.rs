@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::sentences::{
     along, axis, called, capital, interval, join, missing, mm, sentence, statistic, title,
 };
-use super::story::{gained, smooth_residual};
+use super::story::{smooth_residual, story};
 use super::{parameters, sentences};
 use crate::diagnose::{CannotTell, Diagnosis, MapRow, Verdict, ViewLine};
 use crate::report::document::{
@@ -32,12 +32,8 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Markup {
             ("unsure", "Not settled", sentence)
         }
     };
-    let unsettled = diagnosis.verdict == Verdict::Inconclusive;
-    let why = diagnosis.remarks.first().filter(|_| unsettled);
     let more = html! {
-        @if let Some(why) = why { p { (prose(why)) } }
-        @if let Some(gained) = gained(diagnosis) { p { (prose(&gained)) } }
-        p { (prose(&sentences::verdict(diagnosis))) }
+        @for sentence in story(diagnosis) { p { (prose(&sentence)) } }
         (tiles(diagnosis))
     };
     answer(class, mark, &sentence, &more)
@@ -54,6 +50,7 @@ fn tiles(diagnosis: &Diagnosis) -> Markup {
     };
     let remaining = match (diagnosis.after.verdict, diagnosis.after.remaining.len()) {
         (Verdict::Match, _) => "nothing".into(),
+        (Verdict::Mismatch, 0) => "still a mismatch".into(),
         (_, 0) => "not settled".into(),
         (_, left) => count(left, "difference"),
     };

@@ -1,14 +1,12 @@
-//! The page's wording of the verdict and of findings by their status.
+//! The page's wording of findings by their status.
 
-use crate::diagnose::{Diagnosis, Finding, Reference, Status, Verdict};
+use crate::diagnose::{Diagnosis, Finding, Reference, Status};
 use crate::effects;
-use crate::report::numbers::{count, decimals_for, fixed, millimetres};
+use crate::report::numbers::{decimals_for, fixed, millimetres};
 use crate::terms::{Axis, Statistic};
 
 /// Least probability at which a third or later alternative enters a finding's name.
 const MIN_PROBABILITY: f64 = 0.05;
-/// Most findings named in the first sentence.
-const MAX_NAMES: usize = 3;
 /// Times from this on are given in minutes, s.
 const MINUTES_FROM_S: f64 = 180.0;
 const SECONDS_A_MINUTE: f64 = 60.0;
@@ -28,51 +26,6 @@ pub fn subject(diagnosis: &Diagnosis) -> &'static str {
     match diagnosis.reference {
         Reference::Model => "model",
         Reference::SimulatedRecording => "simulation",
-    }
-}
-
-/// The verdict in a sentence or two.
-pub(super) fn verdict(diagnosis: &Diagnosis) -> String {
-    let effects = missing(&diagnosis.findings);
-    let name = |f: &&Finding| [Some(called(f)), f.which_views()].into_iter().flatten();
-    let names = effects.iter().take(MAX_NAMES).map(|f| name(f).collect::<Vec<_>>().join(" "));
-    let names = join(&names.collect::<Vec<_>>(), "and");
-    let contradicted: Vec<String> =
-        diagnosis.findings.iter().filter_map(|f| f.contradicted.map(against)).collect();
-    let recalibrate = diagnosis.findings.iter().any(|f| f.status == Status::Recalibrate);
-    match (diagnosis.verdict, effects.is_empty()) {
-        (Verdict::Match, _) => {
-            let reference = match diagnosis.reference {
-                Reference::Model => "the calibrated model",
-                Reference::SimulatedRecording => "the simulated recording",
-            };
-            format!("The model explains this recording: nothing differs from {reference} by more than chance.")
-        }
-        (Verdict::Inconclusive, true) => {
-            "This recording does not settle whether the model is right.".into()
-        }
-        (Verdict::Inconclusive, false) => {
-            format!("This recording does not settle whether the model is right. There are hints of {names}.")
-        }
-        (Verdict::Mismatch, true) if !contradicted.is_empty() => {
-            format!("The model has {}: it belongs to another sensor or to other settings.", join(&contradicted, "and"))
-        }
-        (Verdict::Mismatch, true) if recalibrate => {
-            "The model lacks no effect, but its parameters do not fit this sensor: calibrate it again.".into()
-        }
-        (Verdict::Mismatch, true) => {
-            "Model and recording differ, and these views cannot show why.".into()
-        }
-        (Verdict::Mismatch, false) => {
-            let above_all = if effects.len() > MAX_NAMES { ", above all" } else { ":" };
-            let more = match (recalibrate, &contradicted[..]) {
-                (_, [_, ..]) => format!("; and it has {}", join(&contradicted, "and")),
-                (true, []) => "; its own parameters are off as well".into(),
-                (false, []) => String::new(),
-            };
-            let (subject, effects) = (subject(diagnosis), count(effects.len(), "effect"));
-            format!("The {subject} leaves {effects} out{above_all} {names}{more}.")
-        }
     }
 }
 

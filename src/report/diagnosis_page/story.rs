@@ -149,6 +149,9 @@ fn left(diagnosis: &Diagnosis) -> Option<String> {
     Some(match (after.verdict, after.remaining.len()) {
         (Verdict::Match, _) => "The same tests find nothing more in the extended model.".into(),
         (Verdict::Inconclusive, _) => "What the extended model leaves could not be tested.".into(),
+        (Verdict::Mismatch, 0) => {
+            "The same tests still find a mismatch beside the extended model.".into()
+        }
         (Verdict::Mismatch, n) => format!(
             "The same tests still find {} beside the extended model, {} of what was explained.",
             count(n, "difference"),

@@ -50,7 +50,7 @@ fn line(i: usize, f: &Finding) -> Vec<Markup> {
         html! { @if let Some(p) = f.p_adjusted { (p_value(p)) } @else { "–" } },
         capital(statistic(f.statistic)),
         html! { (capital(axis(f.axis))) ": " (place) },
-        prose(&short_advice(f)),
+        prose(&advice(f)),
     ]
 }
 
@@ -70,23 +70,27 @@ fn is_of_target(f: &Finding) -> bool {
     !f.terms.is_empty() && f.terms.iter().all(|t| !t.belongs_to_sensor())
 }
 
-/// Advice in a few words; the finding's card gives it in full.
-fn short_advice(f: &Finding) -> String {
-    match (f.status, &f.next_view) {
-        (Status::OneOf, Some(view)) | (Status::Unexplained, Some(view)) => {
+/// What to do about a finding, in a few words.
+pub(super) fn advice(f: &Finding) -> String {
+    let words = match (f.status, &f.next_view) {
+        (Status::OneOf | Status::Unexplained, Some(view)) => {
             let tilt = fixed(view.theta_rad.to_degrees(), 0);
-            format!("one more view: {} m, tilt {tilt}°", fixed(view.z_m, 2))
+            return format!("one more view: {} m, tilt {tilt}°", fixed(view.z_m, 2));
         }
-        (Status::Named, _) if is_of_target(f) => "use a flatter target: the sensor is right".into(),
-        (Status::Named, _) if f.is_corrected() => "`kinoise correct` takes it out".into(),
-        (Status::Named, _) if f.effect == Some("target-motion") => "keep the target still".into(),
-        (Status::Named, _) => "nothing: the extended model has it".into(),
-        (Status::OneOf, None) if f.is_law() => "references near and far, from a cold start".into(),
-        (Status::OneOf, None) => "views at other distances and tilts".into(),
-        (Status::Unexplained, None) => "vary one condition at a time to find its cause".into(),
-        (Status::Recalibrate, _) => "`kinoise calibrate` again".into(),
-        (Status::NotIdentifiable, _) => "measure distances with a tape".into(),
-    }
+        (Status::Named, _) if is_of_target(f) => "use a flatter target: the sensor is right",
+        (Status::Named, _) if f.is_corrected() => "`kinoise correct` takes it out",
+        (Status::Named, _) if f.effect == Some("target-motion") => "keep the target still",
+        (Status::Named, _) => "nothing: the extended model has it",
+        (Status::OneOf, None) if f.is_law() => "measure near and far in turn, from a cold start",
+        (Status::OneOf, None) => "add views at other distances and tilts",
+        (Status::Unexplained, None) => "vary one condition at a time to find its cause",
+        (Status::Recalibrate, _) => "run `kinoise calibrate` again",
+        (Status::NotIdentifiable, _) => {
+            "measure the distance from sensor to target with a tape in a few views at different distances, write it into \
+             each view's view.json as “reference_distance_m”, and diagnose again"
+        }
+    };
+    words.into()
 }
 
 /// Table of the findings below a hundredth of the mismatch.
