@@ -60,23 +60,22 @@ fn fitted(
         let what = "lines repeat the time of the line before; they are left out";
         say(format!("note: {path}: {repeated} {what}"));
     }
-    let Resampled { poses, gaps } =
+    let Resampled { mut poses, gaps_s } =
         resample(&read.poses, frames.map(|n| n.saturating_mul(stride)))?;
-    let placed = place(room, &poses)?;
-    if !gaps.is_empty() {
-        let (count, seconds) =
-            (counted(gaps.len(), "gap"), gaps.iter().map(|g| g.seconds()).sum::<f64>());
+    let (room_from_world, clearance) = place(room, &poses)?;
+    if !gaps_s.is_empty() {
+        let (count, seconds) = (counted(gaps_s.len(), "gap"), gaps_s.iter().sum::<f64>());
         say(format!(
             "note: {path}: {count} without poses, {seconds:.1} s in all; the path is interpolated there"
         ));
     }
-    let motion = placed.room_from_world;
-    let (shift, turn) = (motion.translation, motion.rotation.euler_angles().2.to_degrees());
-    let (x, y, z, clearance) = (shift.x, shift.y, shift.z, placed.clearance_m);
+    let turn = room_from_world.rotation.euler_angles().2.to_degrees();
+    let [x, y, z]: [f64; 3] = room_from_world.translation.vector.into();
     say(format!(
         "note: the path was placed by a turn of {turn:.0} degrees and a shift of ({x:.2}, {y:.2}, {z:.2}) m; it keeps {clearance:.2} m away from everything ({CLEARANCE_M} m are needed)"
     ));
-    Ok(placed.apply(&poses))
+    poses.iter_mut().for_each(|p| p.world_from_camera = room_from_world * p.world_from_camera);
+    Ok(poses)
 }
 
 /// Refuses causes of the target: a room has none that could be bent or move.

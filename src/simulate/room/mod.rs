@@ -22,9 +22,7 @@ mod textures;
 pub use crate::trajectory::{Pose, Trajectory, read_trajectory};
 pub use body::{Body, PosedRoom, Room};
 pub use office::{CEILING_M, FLOOR_M};
-pub use path::{
-    CLEARANCE_M, Gap, Placement, Resampled, around_the_desks, looking, place, resample,
-};
+pub use path::{CLEARANCE_M, Resampled, around_the_desks, looking, place, resample};
 pub use render::{Picture, RoomCamera};
 pub use shape::{Intersection, Shape};
 pub use shutter::Shutter;

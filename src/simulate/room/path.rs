@@ -51,24 +51,11 @@ pub fn looking(eye: Vector3<f64>, target: Vector3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(eye), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// An interval without samples, s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gap {
-    pub from: f64,
-    pub to: f64,
-}
-
-impl Gap {
-    pub fn seconds(&self) -> f64 {
-        self.to - self.from
-    }
-}
-
-/// Poses at 30 Hz, and the gaps that were interpolated across.
+/// Poses at 30 Hz, and the lengths of the gaps that were interpolated across.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resampled {
     pub poses: Vec<Pose>,
-    pub gaps: Vec<Gap>,
+    pub gaps_s: Vec<f64>,
 }
 
 /// Longest interval that is no gap, s: six frames, so a trajectory sampled at 5 Hz or more has no gaps.
@@ -98,14 +85,15 @@ pub fn resample(samples: &[Pose], limit: Option<usize>) -> Result<Resampled> {
         });
     }
     let last = start + (frames - 1.0) / RATE_HZ;
-    let gaps = samples
+    let gaps_s = samples
         .windows(2)
-        .map(|w| Gap { from: w[0].stamp, to: w[1].stamp })
-        .filter(|gap| gap.seconds() > GAP_S && gap.from < last)
+        .filter(|w| w[0].stamp < last)
+        .map(|w| w[1].stamp - w[0].stamp)
+        .filter(|gap_s| *gap_s > GAP_S)
         .collect();
     let poses =
         (0..frames as usize).map(|k| interpolate(samples, start + k as f64 / RATE_HZ)).collect();
-    Ok(Resampled { poses, gaps })
+    Ok(Resampled { poses, gaps_s })
 }
 
 fn interpolate(samples: &[Pose], stamp: f64) -> Pose {
@@ -162,24 +150,6 @@ fn speed(samples: &[Pose], i: usize) -> Vector3<f64> {
 /// Least distance of the sensor from everything, m: half the width of a Kinect (0.28 m).
 pub const CLEARANCE_M: f64 = 0.14;
 
-/// Placement of a path in the room.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placement {
-    pub room_from_world: Isometry3<f64>,
-    /// Least distance of the path from furniture and walls, m.
-    pub clearance_m: f64,
-}
-
-impl Placement {
-    pub fn apply(&self, poses: &[Pose]) -> Vec<Pose> {
-        let moved = |p: &Pose| Pose {
-            stamp: p.stamp,
-            world_from_camera: self.room_from_world * p.world_from_camera,
-        };
-        poses.iter().map(moved).collect()
-    }
-}
-
 /// Number of orientations tried about the vertical.
 const TURNS: usize = 24;
 /// Heights of a hand-held sensor, m; a path outside was not measured from the floor.
@@ -192,17 +162,18 @@ const AHEAD_M: f64 = 1.3;
 const GAZE_REACH_M: f64 = 4.0;
 
 /// Places a path with z up so that its gaze point is at the desks, or else so that its middle is the
-/// room's. Returns an error when every placement comes too near to furniture or walls.
-pub fn place(room: &Room, poses: &[Pose]) -> Result<Placement> {
+/// room's. Returns `room_from_world` and the path's least distance from furniture and walls, m; an error
+/// when every placement comes too near to them.
+pub fn place(room: &Room, poses: &[Pose]) -> Result<(Isometry3<f64>, f64)> {
     let mut reached = f64::NEG_INFINITY;
     for anchor in anchors(poses) {
         let placed = (0..TURNS).map(|k| turned(room, poses, anchor, k));
-        let widest = placed.max_by(|a, b| a.clearance_m.total_cmp(&b.clearance_m));
-        if let Some(found) = widest {
-            if found.clearance_m >= CLEARANCE_M {
-                return Ok(found);
+        let widest = placed.max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((room_from_world, clearance_m)) = widest {
+            if clearance_m >= CLEARANCE_M {
+                return Ok((room_from_world, clearance_m));
             }
-            reached = reached.max(found.clearance_m);
+            reached = reached.max(clearance_m);
         }
     }
     let (low, high) = bounds(poses);
@@ -216,7 +187,7 @@ pub fn place(room: &Room, poses: &[Pose]) -> Result<Placement> {
     })
 }
 
-fn turned(room: &Room, poses: &[Pose], anchor: Vector2<f64>, turn: usize) -> Placement {
+fn turned(room: &Room, poses: &[Pose], anchor: Vector2<f64>, turn: usize) -> (Isometry3<f64>, f64) {
     let turn = Vector3::z() * (TAU * turn as f64 / TURNS as f64);
     let to_middle = Isometry3::translation(-anchor.x, -anchor.y, lift(poses));
     let room_from_world = Isometry3::new(Vector3::zeros(), turn) * to_middle;
@@ -224,7 +195,7 @@ fn turned(room: &Room, poses: &[Pose], anchor: Vector2<f64>, turn: usize) -> Pla
         let position = room_from_world * p.world_from_camera;
         room.clearance(&position.translation.vector).0
     });
-    Placement { room_from_world, clearance_m: along.fold(f64::INFINITY, f64::min) }
+    (room_from_world, along.fold(f64::INFINITY, f64::min))
 }
 
 /// Vertical shift of the path, m: zero where its heights are those of a hand-held sensor.

@@ -9,10 +9,10 @@ use super::body::PosedRoom;
 use super::render::{Picture, RoomCamera};
 use super::{Film, Pose};
 use crate::camera::Rays;
-use crate::effects::{Acting, Active, Instant};
+use crate::effects::{Acting, Instant};
 use crate::error::Result;
 use crate::frame::{DepthCode, Frame};
-use crate::model::{SigmaLookup, SigmaModel};
+use crate::model::SigmaLookup;
 use crate::scene::Seen;
 use crate::simulate::formula::FormulaSensor;
 use crate::simulate::shoot::Physics;
@@ -48,9 +48,11 @@ impl<'a> Shutter<'a> {
     /// Fails as [`SpeckleSensor::new`].
     pub fn new(film: &'a Film, sensor: &'a Sensor, rays: &'a Rays) -> Result<Self> {
         let depth = match &film.physics {
-            Physics::Formula { sigma, effects } => {
-                DepthCamera::formula(sensor, rays, sigma, effects, film)
-            }
+            Physics::Formula { sigma, effects } => DepthCamera::Formula {
+                sensor: FormulaSensor { sensor, rays, sigma, effects, seed: film.seed },
+                sigma: SigmaLookup::of(sigma),
+                memory: Memory::new(),
+            },
             Physics::Speckle { causes } => DepthCamera::Speckle {
                 // The sensor's words have the code of its read-out; what is written has another.
                 sensor: Box::new(SpeckleSensor::new(&film.sensor, causes.clone())?),
@@ -78,21 +80,7 @@ impl<'a> Shutter<'a> {
     }
 }
 
-impl<'a> DepthCamera<'a> {
-    fn formula(
-        sensor: &'a Sensor,
-        rays: &'a Rays,
-        sigma: &'a SigmaModel,
-        effects: &'a [Active],
-        film: &Film,
-    ) -> Self {
-        DepthCamera::Formula {
-            sensor: FormulaSensor { sensor, rays, sigma, effects, seed: film.seed },
-            sigma: SigmaLookup::of(sigma),
-            memory: Memory::new(),
-        }
-    }
-
+impl DepthCamera<'_> {
     fn expose(&mut self, film: &Film, seen: &[(Instant, &Picture, &Pose)]) -> Vec<Frame> {
         match self {
             DepthCamera::Formula { sensor, sigma, memory } => {
@@ -140,6 +128,8 @@ fn sigma_of(seen: &Seen, sigma: &SigmaLookup) -> Vec<f32> {
 mod tests {
     use super::super::{Room, around_the_desks};
     use super::*;
+    use crate::effects::Active;
+    use crate::model::SigmaModel;
     use crate::rng::Seed;
 
     /// Depth frames of these poses, a Kinect's 80 x 60 px, with one effect.
