@@ -88,9 +88,12 @@ pub(super) fn changes(groups: &[(String, Vec<&UnitModel>)]) -> Result<Vec<Change
 fn change(unit: &str, from: &UnitModel, to: &UnitModel) -> Result<Change> {
     let only = |these: &UnitModel, those: &UnitModel| {
         let known = |id: &String| those.model.effects.iter().any(|e| e.id == *id);
-        let mut ids: Vec<String> = these.model.effects.iter().map(|e| e.id.clone()).collect();
-        ids.retain(|id| !known(id));
-        ids.dedup();
+        let mut ids: Vec<String> = Vec::new();
+        for effect in &these.model.effects {
+            if !known(&effect.id) && !ids.contains(&effect.id) {
+                ids.push(effect.id.clone());
+            }
+        }
         ids
     };
     Ok(Change {

@@ -133,7 +133,7 @@ fn group<'a>(models: &'a [UnitModel], remarks: &mut Vec<String>) -> Vec<Group<'a
         sorted.dedup();
         if dates.iter().all(Option::is_some) && sorted.len() == dates.len() {
             models.sort_by_key(|u| u.created());
-        } else {
+        } else if models.len() > 1 {
             remarks.push(format!(
                 "{name}: its models do not tell two dates apart; the last one given is taken for the newest"
             ));

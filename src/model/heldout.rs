@@ -26,7 +26,7 @@ const MAX_FOLDS: usize = 8;
 /// counts, so remove outliers first ([`super::sort_out`]) for a fair comparison of forms.
 ///
 /// `None` when there are fewer than three distances or a fold cannot be fitted.
-pub fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
+fn held_out(table: &SigmaTable, form: Form) -> Option<HeldOut> {
     let folds = folds(table);
     let count = folds.iter().map(|(_, fold)| fold + 1).max()?;
     let fold_of = |view: usize| folds.iter().find(|(v, _)| *v == view).map_or(0, |(_, f)| *f);

@@ -49,14 +49,8 @@ impl Sorted {
             _ => fit_all(&self.kept, form)?,
         };
         fitted.remarks.splice(0..0, self.remark.clone());
-        fitted.left_out = self.left_out.clone();
         Ok(fitted)
     }
-}
-
-/// Fits `form` to `table` without its outliers, which the remarks name.
-pub fn fit(table: &SigmaTable, form: Form) -> Result<SigmaFit> {
-    sort_out(table).fit(form)
 }
 
 /// Removes outliers from the most flexible surface that can be fitted to the rest.

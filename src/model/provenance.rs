@@ -45,11 +45,6 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Of this program, now.
-    pub fn now(seed: Option<u64>) -> Self {
-        Self::at(seed, SystemTime::now())
-    }
-
     /// Of this program, at the given time.
     pub fn at(seed: Option<u64>, time: SystemTime) -> Self {
         Provenance {

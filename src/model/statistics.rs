@@ -6,7 +6,6 @@ use nalgebra::DMatrix;
 use super::forms::{Form, SigmaForm, natural_jacobian};
 use super::rows::Rows;
 use super::surface::{Direction, Domain, SigmaModel};
-use crate::measure::SigmaRow;
 use crate::read::MAX_NUMBER;
 
 /// A parameter as reported.
@@ -29,15 +28,12 @@ pub struct SigmaFit {
     pub domain: Domain,
     pub rows: usize,
     pub views: usize,
-    /// Outliers, which were not fitted.
-    pub left_out: Vec<SigmaRow>,
     /// Views less free parameters (at least 1), for the quantiles of intervals.
     pub degrees_of_freedom: f64,
     /// Relative scatter beyond sampling, within views and between them.
     pub extra_within: f64,
     pub extra_between: f64,
     pub quality: Quality,
-    pub iterations: usize,
     pub converged: bool,
     pub remarks: Vec<String>,
 }
@@ -122,12 +118,10 @@ pub(super) fn report(
         covariance,
         rows: rows.len(),
         views: rows.views(),
-        left_out: Vec::new(),
         degrees_of_freedom: (rows.views() as f64 - free.len() as f64).max(1.0),
         extra_within: rows.extra()[0],
         extra_between: rows.extra()[1],
         quality,
-        iterations,
         converged,
         remarks,
     }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use kinoise::io::{Assumed, FrameSource, open};
 use kinoise::measure::{MeasureOptions, SigmaRow, SigmaTable, Workbench, measure_view};
-use kinoise::model::fit;
+use kinoise::model::sort_out;
 use kinoise::plane::{
     Effort, InverseDepthImage, Points, RansacOptions, find_target, fit_affine_robust, ransac_plane,
 };
@@ -122,7 +122,7 @@ fn fits(c: &mut Criterion) {
     for samples in [100.0, 100_000.0] {
         let table = cells(samples);
         c.bench_function(&format!("fit: six parameters, 100 cells of {samples} samples"), |b| {
-            b.iter(|| fit(black_box(&table), Form::Paper).expect("fitted"));
+            b.iter(|| sort_out(black_box(&table)).fit(Form::Paper).expect("fitted"));
         });
     }
 }

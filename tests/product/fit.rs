@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use kinoise::measure::{SigmaRow, SigmaTable, read_table};
-use kinoise::model::{PAPER_EQ1, compare_forms, fit};
+use kinoise::model::{PAPER_EQ1, compare_forms, sort_out};
 use kinoise::{Form, Seed, SigmaModel};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -30,7 +30,7 @@ fn an_exact_table_gives_its_six_coefficients_back() {
     for table in
         [exact((0..=76).step_by(4)), exact([0, 10, 20, 30, 40, 50, 60, 70, 76].into_iter())]
     {
-        let fitted = fit(&table, Form::Paper).unwrap();
+        let fitted = sort_out(&table).fit(Form::Paper).unwrap();
         assert!(fitted.converged);
         for (p, truth) in fitted.parameters.iter().zip(PAPER_EQ1) {
             assert!((p.value / truth - 1.0).abs() < 1e-6, "{} = {} for {truth}", p.name, p.value);
@@ -55,7 +55,7 @@ const SCIPY_STD_ERRORS: [f64; 6] = [1.174e-5, 7.860e-6, 5.189e-3, 1.252e-7, 2.24
 fn a_noisy_table_ends_where_scipy_ends() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/noisy_eq1.csv");
     let table = read_table(&path).unwrap();
-    let fitted = fit(&table, Form::Paper).unwrap();
+    let fitted = sort_out(&table).fit(Form::Paper).unwrap();
     for ((p, truth), std_error) in fitted.parameters.iter().zip(SCIPY).zip(SCIPY_STD_ERRORS) {
         assert!((p.value / truth - 1.0).abs() < 1e-7, "{} = {} for {truth}", p.name, p.value);
         let own = p.std_error.unwrap() * (0.447f64 / 0.5).sqrt();
@@ -75,7 +75,7 @@ fn no_table_ends_in_a_wrong_minimum() {
             let draw: f64 = StandardNormal.sample(&mut rng);
             row.sigma_m *= (1.0 + noise * draw).max(0.3);
         }
-        let fitted = fit(&table, Form::Paper).unwrap();
+        let fitted = sort_out(&table).fit(Form::Paper).unwrap();
         let deviance = |sigma: &dyn Fn(&SigmaRow) -> f64| {
             table
                 .rows
@@ -103,9 +103,9 @@ fn the_order_of_the_rows_does_not_matter() {
     for row in &mut table.rows {
         row.sigma_m *= 1.0 + 0.02 * rng.random_range(-1.0..1.0);
     }
-    let forward = fit(&table, Form::Paper).unwrap();
+    let forward = sort_out(&table).fit(Form::Paper).unwrap();
     table.rows.reverse();
-    let backward = fit(&table, Form::Paper).unwrap();
+    let backward = sort_out(&table).fit(Form::Paper).unwrap();
     for (a, b) in forward.parameters.iter().zip(&backward.parameters) {
         assert!((a.value / b.value - 1.0).abs() < 1e-6, "{}: {} {}", a.name, a.value, b.value);
     }
@@ -122,14 +122,14 @@ fn coefficients_that_the_views_do_not_show_are_said_so() {
         table
     };
     let frontal = noisy(exact([0, 10, 20, 30, 40, 50, 60].into_iter()));
-    let fitted = fit(&frontal, Form::Paper).unwrap();
+    let fitted = sort_out(&frontal).fit(Form::Paper).unwrap();
     let all = fitted.remarks.join("\n");
     assert!(all.contains("d, e and f") && all.contains("74 degrees"), "{all}");
     assert!(fitted.parameters[5].std_error.is_none(), "f is held");
     // c is not determined by views from 3 m on.
     let mut far = noisy(exact([0, 30, 60, 70, 74, 76].into_iter()));
     far.rows.retain(|r| r.z_m >= 3.0);
-    let all = fit(&far, Form::Paper).unwrap().remarks.join("\n");
+    let all = sort_out(&far).fit(Form::Paper).unwrap().remarks.join("\n");
     assert!(all.contains("nearest view is at 3.00 m") || all.contains("c is held"), "{all}");
 }
 
@@ -161,24 +161,24 @@ fn held_out_distances_prefer_the_form_that_made_the_data() {
 fn one_distance_or_three_rows_are_refused() {
     let mut table = exact([0, 20, 40, 60, 70].into_iter());
     table.rows.retain(|r| r.z_m < 1.1);
-    let message = fit(&table, Form::Paper).unwrap_err().to_string();
+    let message = sort_out(&table).fit(Form::Paper).unwrap_err().to_string();
     assert!(
         message.contains("1 different distance") && message.contains("khoshelham"),
         "{message}"
     );
-    assert!(fit(&table, Form::Khoshelham).is_ok());
+    assert!(sort_out(&table).fit(Form::Khoshelham).is_ok());
     table.rows.truncate(3);
-    assert!(fit(&table, Form::Paper).is_err());
+    assert!(sort_out(&table).fit(Form::Paper).is_err());
     table.rows.clear();
     for form in Form::ALL {
-        assert!(fit(&table, form).is_err(), "{form}");
+        assert!(sort_out(&table).fit(form).is_err(), "{form}");
     }
 }
 
 /// For any argument, sigma is finite and positive.
 #[test]
 fn sigma_never_reaches_the_pole() {
-    let fitted = fit(&exact((0..=76).step_by(4)), Form::Paper).unwrap();
+    let fitted = sort_out(&exact((0..=76).step_by(4))).fit(Form::Paper).unwrap();
     let model = fitted.model();
     for z in [0.0, 1e-6, 0.5, 2.0, 100.0, f64::MAX] {
         for theta in [-2.0, 0.0, 1.38, 1.39, 1.3900001, 1.5, 3.0, 1e9] {
@@ -201,8 +201,8 @@ fn sigmas_far_off_the_surface_are_left_out_and_told() {
         row.sigma_m *= 1.0 + 0.02 * draw;
         row.n_effective = Some(1250.0);
     }
-    let clean = fit(&table, Form::Paper).unwrap();
-    assert!(clean.left_out.is_empty(), "{:?}", clean.remarks);
+    let clean = sort_out(&table);
+    assert!(clean.left_out.is_empty(), "{:?}", clean.remark);
     let spoiled = [3, 17, 29, 44, 60];
     let mut kept = table.clone();
     for (k, &i) in spoiled.iter().enumerate() {
@@ -210,9 +210,10 @@ fn sigmas_far_off_the_surface_are_left_out_and_told() {
     }
     kept.rows =
         (0..kept.rows.len()).filter(|i| !spoiled.contains(i)).map(|i| kept.rows[i]).collect();
-    let fitted = fit(&table, Form::Paper).unwrap();
-    let without = fit(&kept, Form::Paper).unwrap();
-    assert_eq!(fitted.left_out.len(), spoiled.len());
+    let sorted = sort_out(&table);
+    assert_eq!(sorted.left_out.len(), spoiled.len());
+    let fitted = sorted.fit(Form::Paper).unwrap();
+    let without = sort_out(&kept).fit(Form::Paper).unwrap();
     assert!(fitted.remarks[0].starts_with("5 of 70 sigmas"), "{}", fitted.remarks[0]);
     for (a, b) in fitted.parameters.iter().zip(&without.parameters) {
         assert!((a.value / b.value - 1.0).abs() < 1e-9, "{}: {} {}", a.name, a.value, b.value);

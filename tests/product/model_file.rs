@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use kinoise::measure::{Cell, SigmaRow, SigmaTable};
-use kinoise::model::{Direction, PAPER_EQ1, compare_forms, fit};
+use kinoise::model::{Direction, PAPER_EQ1, compare_forms, sort_out};
 use kinoise::simulate::Physics;
 use kinoise::{Form, NoiseModel, Seed, SigmaModel};
 use rand_distr::{Distribution, StandardNormal};
@@ -86,7 +86,7 @@ fn a_fit_stays_positive_between_its_distances() {
         .collect();
     let table = SigmaTable { rows };
     for form in [Form::Paper, Form::Nguyen] {
-        let fitted = fit(&table, form).expect("fitted");
+        let fitted = sort_out(&table).fit(form).expect("fitted");
         assert_eq!(fitted.model().fault(), None, "{form}");
         assert!(fitted.remarks.join("\n").contains("a is held"), "{form}: {:?}", fitted.remarks);
     }
@@ -177,7 +177,7 @@ fn two_views_are_no_calibration() {
             }
         })
         .collect();
-    let fitted = fit(&SigmaTable { rows }, Form::Paper).expect("fitted");
+    let fitted = sort_out(&SigmaTable { rows }).fit(Form::Paper).expect("fitted");
     let words = fitted.remarks.join("\n");
     assert!(words.contains("no calibration: a surface through 2 views"), "{words}");
 }

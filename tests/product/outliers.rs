@@ -1,7 +1,7 @@
 //! Outliers at random rows: they are found, and none are found where there are none.
 
 use kinoise::measure::{SigmaRow, SigmaTable};
-use kinoise::model::{PAPER_EQ1, compare_forms, fit, sort_out};
+use kinoise::model::{PAPER_EQ1, compare_forms, sort_out};
 use kinoise::rng::Stream;
 use kinoise::{Form, Seed};
 use rand::seq::index::sample;
@@ -112,14 +112,14 @@ fn outliers_pull_no_form_and_no_comparison() {
     let spoiled = spoil(&mut all, 1000.0, 3, &mut rng);
     let good =
         SigmaTable { rows: all.rows.iter().filter(|r| !spoiled.contains(r)).copied().collect() };
-    assert_eq!(sort_out(&all).kept, good);
+    let sorted = sort_out(&all);
+    assert_eq!((sorted.left_out.len(), &sorted.kept), (3, &good));
     for form in Form::ALL {
-        let (with, without) = (fit(&all, form).unwrap(), fit(&good, form).unwrap());
+        let (with, without) = (sorted.fit(form).unwrap(), sort_out(&good).fit(form).unwrap());
         assert_eq!(with.values(), without.values(), "{form}");
-        assert_eq!(with.left_out.len(), 3, "{form}");
         assert!(with.remarks[0].starts_with("3 of 30 sigmas"), "{form}: {:?}", with.remarks);
     }
-    let scores = compare_forms(&sort_out(&all).kept);
+    let scores = compare_forms(&sorted.kept);
     assert_eq!(scores, compare_forms(&good));
     assert_eq!(scores[0].form, Form::Paper, "{scores:?}");
 }
@@ -133,8 +133,9 @@ fn a_third_of_the_rows_is_no_outlier() {
     for i in (0..table.rows.len()).step_by(3) {
         table.rows[i].sigma_m *= 20.0;
     }
-    let fitted = fit(&table, Form::Paper).unwrap();
-    assert!(fitted.left_out.is_empty());
+    let sorted = sort_out(&table);
+    assert!(sorted.left_out.is_empty());
+    let fitted = sorted.fit(Form::Paper).unwrap();
     let words = fitted.remarks.join("\n");
     assert!(fitted.quality.is_poor() && words.contains("the fit is poor"), "{words}");
 }

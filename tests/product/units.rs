@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use kinoise::fleet::{Comparison, UnitModel, compare};
 use kinoise::measure::{SigmaRow, SigmaTable};
-use kinoise::model::{Covariance, Effect, FitSummary, PAPER_EQ1, Provenance, fit};
+use kinoise::model::{Covariance, Effect, FitSummary, PAPER_EQ1, Provenance, sort_out};
 use kinoise::simulate::kinect_v1;
 use kinoise::stats::{at_least, at_most};
 use kinoise::terms::{Basis, Modulation, Term};
@@ -42,7 +42,7 @@ fn calibrated(times: f64, seed: u64) -> SigmaModel {
             });
         }
     }
-    fit(&SigmaTable { rows }, Form::Paper).expect("fitted").model()
+    sort_out(&SigmaTable { rows }).fit(Form::Paper).expect("fitted").model()
 }
 
 fn unit(serial: &str, date: &str, sigma: SigmaModel) -> UnitModel {
@@ -164,6 +164,19 @@ fn an_unchanged_unit_has_not_changed() {
     assert!(at_least(alarms, n, 0.01) > 1e-3, "{alarms} false alarms in {n}");
     // The six places of a pair are correlated: count one per pair.
     assert!(at_most(covered / 6, n, 0.95) > 1e-3, "{covered} of {}", 6 * n);
+}
+
+/// Only models of one unit need an order in time.
+#[test]
+fn a_date_is_missed_where_two_models_are_of_one_unit() {
+    let told = |units: [(&str, &str); 3]| {
+        let model = |((serial, date), seed)| unit(serial, date, calibrated(1.0, seed));
+        let models: Vec<UnitModel> = units.into_iter().zip(1..).map(model).collect();
+        let remarks = compare(&models).expect("compared").remarks;
+        remarks.iter().any(|r| r.contains("do not tell two dates apart"))
+    };
+    assert!(!told([("a", "unknown"), ("b", "unknown"), ("c", "unknown")]));
+    assert!(told([("a", "unknown"), ("a", "2026-01-01"), ("b", "2026-01-01")]));
 }
 
 /// 20 % more noise is found in every pair, with its size, whatever the order of the files.

@@ -131,7 +131,7 @@ fn posed(distances_m: &[f64], tilts_deg: &[f64]) -> Value {
         effects: Vec::new(),
         uncertainty: None,
         fit: FitSummary::default(),
-        provenance: Provenance::now(None),
+        provenance: Provenance::default(),
     }
     .write(&model)
     .expect("written");

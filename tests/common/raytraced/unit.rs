@@ -97,10 +97,7 @@ impl Unit {
             uncertainty: None,
             fit: FitSummary::default(),
             // The same bytes whenever it is written.
-            provenance: Provenance {
-                created: "1970-01-01T00:00:00Z".into(),
-                ..Provenance::now(None)
-            },
+            provenance: Provenance::at(None, std::time::SystemTime::UNIX_EPOCH),
         })
     }
 }
