@@ -75,8 +75,8 @@ pub struct Run {
 pub struct Row {
     pub variant: Variant,
     pub runs: Vec<Run>,
-    /// Why a run failed.
-    pub failed: Option<String>,
+    /// Why runs failed, in order.
+    pub failed: Vec<String>,
 }
 
 /// All data shown by the tables and figures.
@@ -122,20 +122,20 @@ pub fn compare(
     let runs = |v: &Variant| if v.options.init == Init::Orb { repeats } else { 1 };
     let (mut done, total) = (0, variants.iter().map(runs).sum());
     for variant in variants {
-        let mut row = Row { variant: *variant, runs: Vec::new(), failed: None };
+        let mut row = Row { variant: *variant, runs: Vec::new(), failed: Vec::new() };
         for repeat in 0..runs(variant) {
             progress(variant.name, done, total);
             done += 1;
             let seed = Seed(seed.0.wrapping_add(repeat as u64));
             match run(sequence, model, &Options { seed, ..variant.options }, delta) {
                 Ok(run) => row.runs.push(run),
-                Err(e) => row.failed = Some(e.to_string()),
+                Err(e) => row.failed.push(e.to_string()),
             }
         }
         rows.push(row);
     }
     if let (true, Some(why)) =
-        (rows.iter().all(|r: &Row| r.runs.is_empty()), rows.iter().find_map(|r| r.failed.clone()))
+        (rows.iter().all(|r: &Row| r.runs.is_empty()), rows.iter().find_map(|r| r.failed.first()))
     {
         let what = format!("no variant makes a map; the first: {why}");
         return Err(Error::recording(&sequence.root, what, "put this right, then run again"));

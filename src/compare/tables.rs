@@ -98,14 +98,18 @@ fn spreads(row: &Row, of: Column) -> TableRow {
         let deviation = (squares / (n - 1.0)).sqrt();
         remark = format!("   ± {deviation:.3} over {} runs", spreads.len());
     }
-    if let Some(why) = &row.failed {
-        remark += &format!("   one failed: {}", why.replace(char::is_control, "?"));
+    if let Some(why) = row.failed.last() {
+        let told = match row.failed.len() {
+            1 => "one failed".to_string(),
+            n => format!("{n} failed, the last"),
+        };
+        remark += &format!("   {told}: {}", why.replace(char::is_control, "?"));
     }
     TableRow { name, figures: means, remark }
 }
 
 fn failure(row: &Row) -> String {
-    let why = row.failed.as_deref().unwrap_or("it was not run");
+    let why = row.failed.last().map_or("it was not run", String::as_str);
     format!("  no figures: {}", why.replace(char::is_control, "?"))
 }
 
@@ -129,7 +133,7 @@ pub fn json(comparison: &Comparison) -> Value {
             "of_the_paper": r.variant.of_the_paper,
             "settings": format!("{:?}", r.variant.options),
             "runs": r.runs.iter().map(run).collect::<Vec<Value>>(),
-            "failed": r.failed,
+            "failed": r.failed.last(),
         })
     };
     json!({
