@@ -22,6 +22,17 @@ use crate::view::{FrameRef, Sensor};
 pub fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     let mut sequence =
         if scenes::is_one(root) { scenes::open(root, assumed)? } else { tum::open(root, assumed)? };
+    let before = sequence.moments.len();
+    sequence.moments.dedup_by(|b, a| a.stamp == b.stamp);
+    sequence.truth.dedup_by(|b, a| a.stamp == b.stamp);
+    let dropped = before - sequence.moments.len();
+    if dropped > 0 {
+        sequence.remarks.push(format!(
+            "{} {} the stamp of the one before; only the first is mapped",
+            counted(dropped, "depth image"),
+            verb(dropped, "has", "have")
+        ));
+    }
     let colourless = sequence.moments.iter().filter(|m| m.colour.is_none()).count();
     if colourless > 0 {
         sequence.remarks.push(format!(

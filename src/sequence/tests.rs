@@ -76,19 +76,6 @@ fn associations_are_taken_at_their_word() {
 }
 
 #[test]
-fn the_benchmarks_cameras_are_known_by_name() {
-    let dir = tum(&[0.0, 0.033], &[]);
-    let list = dir.path().join("depth.txt");
-    let text = fs::read_to_string(&list).unwrap();
-    fs::write(&list, format!("# file: 'rgbd_dataset_freiburg2_desk.bag'\n{text}")).unwrap();
-    let sequence = open(dir.path(), &Assumed::default()).unwrap();
-    assert_eq!(sequence.sensor.camera.fx, 520.9);
-    assert!(sequence.sensor.camera.distortion.is_some());
-    let given = Assumed { intrinsics: Some([500.0, 500.0, 4.0, 3.0]), ..Assumed::default() };
-    assert_eq!(open(dir.path(), &given).unwrap().sensor.camera.fx, 500.0);
-}
-
-#[test]
 fn seven_scenes_folders_are_read() {
     let dir = tempfile::tempdir().unwrap();
     for k in [0, 1, 3] {
@@ -96,8 +83,11 @@ fn seven_scenes_folders_are_read() {
         let pose = format!("1 0 0 {k}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
         fs::write(dir.path().join(format!("frame-{k:06}.pose.txt")), pose).unwrap();
     }
+    // Another name of the second frame's number.
+    depth(&dir.path().join("frame-1.depth.png"));
     let sequence = open(dir.path(), &Assumed::default()).unwrap();
     assert_eq!(sequence.moments.len(), 3);
+    assert!(sequence.moments[1].depth.path.ends_with("frame-000001.depth.png"));
     assert_eq!(sequence.moments[2].stamp, 0.1);
     assert_eq!(sequence.truth[2].world_from_camera.translation.x, 3.0);
     assert_eq!(sequence.sensor.camera.fx, 585.0);

@@ -10,7 +10,6 @@ use crate::io::{
 };
 use crate::read::{first_there, is_there, read_text};
 use crate::trajectory::{associate, read_benchmark};
-use crate::units::{counted, verb};
 use crate::view::FrameRef;
 
 /// Largest difference between timestamps of one moment, s (associate.py's `max_difference`).
@@ -26,17 +25,7 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     let recording = open_uncut(root, assumed)?;
     let mut remarks = recording.remarks;
     let depth = recording.views.into_iter().flat_map(|v| v.depth).collect();
-    let mut moments = with_colour(root, depth, &mut remarks)?;
-    let before = moments.len();
-    moments.dedup_by(|b, a| a.stamp == b.stamp);
-    if moments.len() < before {
-        let dropped = before - moments.len();
-        remarks.push(format!(
-            "{} {} the stamp of the one before; only the first is mapped",
-            counted(dropped, "depth image"),
-            verb(dropped, "has", "have")
-        ));
-    }
+    let moments = with_colour(root, depth, &mut remarks)?;
     let truth = root.join("groundtruth.txt");
     let read = is_there(&truth).and_then(|there| match there {
         true => read_benchmark(&truth),

@@ -404,6 +404,7 @@ fn intrinsics_in_place_of_a_published_camera_are_told() {
     let told = |intrinsics| {
         let assumed = Assumed { intrinsics: Some(intrinsics), ..Assumed::default() };
         let film = sequence::open(desk.folder.path(), &assumed).expect("a sequence");
+        assert_eq!(film.sensor.camera.fx, intrinsics[0]);
         film.remarks.iter().any(|r| r.contains("--intrinsics replaces freiburg3's"))
     };
     assert!(told([525.0, 525.0, 319.5, 239.5]));
