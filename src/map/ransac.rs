@@ -12,7 +12,7 @@ pub type PointPair = (Vector3<f64>, Vector3<f64>);
 const MAX_DISTANCE_M: f64 = 0.05;
 const HYPOTHESES: usize = 500;
 
-/// Three points determine a motion; agreement of as many again is more than chance.
+/// Three pairs determine a motion; five more must agree with it, which unrelated pairs do not (tests below).
 const MIN_INLIERS: usize = 8;
 
 /// `target_from_source` with the most inliers, fitted to those; `None` with too few.

@@ -10,7 +10,7 @@ use super::{Planes, ResidualPicture, ViewMeasurement};
 use crate::frame::Frame;
 use crate::plane::{Effort, Plane, Target, fit_affine_robust};
 use crate::residual::perpendicular_per_axial;
-use crate::stats::{Correlation, measure_correlation, normal_cut_factor};
+use crate::stats::{Correlation, mean, measure_correlation, normal_cut_factor};
 
 impl Scan<'_> {
     /// Refits the plane to all frames, and turns the sums into the view's result (the caller adds names and
@@ -232,11 +232,6 @@ const PICTURE_WIDTH: usize = 160;
 
 /// Subtracts the mean: an offset of the whole frame is not correlation between pixels.
 fn centre(field: &mut [f32]) {
-    let (mut sum, mut n) = (0f64, 0f64);
-    for e in field.iter().filter(|e| e.is_finite()) {
-        sum += f64::from(*e);
-        n += 1.0;
-    }
-    let mean = (sum / n.max(1.0)) as f32;
+    let mean = mean(field.iter().map(|e| f64::from(*e))).unwrap_or(0.0) as f32;
     field.iter_mut().for_each(|e| *e -= mean);
 }

@@ -18,7 +18,8 @@ pub(super) struct FrameReader<'v> {
     notes: Vec<String>,
     table: &'v DepthTable,
     before: Vec<u16>,
-    repeated: usize,
+    /// Numbers of the frames that repeat the one before.
+    repeated: Vec<usize>,
 }
 
 impl<'v> FrameReader<'v> {
@@ -30,13 +31,13 @@ impl<'v> FrameReader<'v> {
             notes: Vec::new(),
             table: &bench.table,
             before: Vec::new(),
-            repeated: 0,
+            repeated: Vec::new(),
         }
     }
 
     /// Notes on the frames read, and the hash of their bytes.
     pub fn finish(self, view: &View) -> (Vec<String>, [u8; 32]) {
-        let (repeated, total) = (self.repeated, view.depth.len());
+        let (repeated, total) = (self.repeated.len(), view.depth.len());
         let told = (repeated > 0).then(|| {
             format!(
                 "{repeated} of {total} frames left out: word for word the frame before; counted as \
@@ -64,7 +65,7 @@ impl Iterator for FrameReader<'_> {
     fn next(&mut self) -> Option<(usize, Frame)> {
         while let Some((number, frame_ref)) = self.frames.next() {
             match self.source.frame(frame_ref) {
-                Ok(f) if f.raw == self.before => self.repeated += 1,
+                Ok(f) if f.raw == self.before => self.repeated.push(number),
                 Ok(f) if f.raw.iter().any(|&raw| self.table.metres(raw).is_finite()) => {
                     self.before.clone_from(&f.raw);
                     return Some((number, f));
@@ -144,9 +145,8 @@ impl<'v> TargetFrames<'v> {
         let mut reader = FrameReader::of(view, bench);
         let (numbers, mut held) = reader.hold(view)?;
         let target = target_of(view, bench, &held)?;
-        if held.len() == 1 && reader.repeated > 0 {
-            let alike = numbers[0]..=numbers[0] + reader.repeated;
-            reader.repeated = 0;
+        if held.len() == 1 && !reader.repeated.is_empty() {
+            let alike = numbers.into_iter().chain(std::mem::take(&mut reader.repeated));
             let frame = held.swap_remove(0);
             let first = Box::new(alike.map(move |number| (number, frame.clone())));
             return Ok((target, TargetFrames { first, stale: 0, reader }));
@@ -167,7 +167,7 @@ impl<'v> TargetFrames<'v> {
     /// Frames left out so far.
     pub fn left_out(&self) -> LeftOut {
         let FrameReader { repeated, notes, .. } = &self.reader;
-        LeftOut { repeated: *repeated, stale: self.stale, lost: notes.len() }
+        LeftOut { repeated: repeated.len(), stale: self.stale, lost: notes.len() }
     }
 }
 

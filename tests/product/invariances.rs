@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use kinoise::diagnose::{DiagnoseOptions, Finding, diagnose};
 use kinoise::effects::Active;
+use kinoise::measure::{MeasureOptions, TargetFrames, Workbench};
 use kinoise::scene::Target;
 use kinoise::simulate::{Grid, Physics, Shoot, kinect_v1};
 use kinoise::view::{FrameRef, Recording, RecordingFile};
@@ -313,6 +314,19 @@ fn a_frame_stored_twice_is_one_frame() {
     let told =
         format!("{frames} of {} frames were left out: word for word the frame before", 2 * frames);
     assert!(remarks.contains(&told), "{remarks:?}");
+}
+
+/// They are frames of their own, numbered as in the view, also beside one that cannot be read.
+#[test]
+fn frames_that_are_all_alike_keep_their_numbers() {
+    let recording = io::open(good(), &io::Assumed::default()).expect("a recording");
+    let mut view = recording.views[0].clone();
+    let frame = view.depth[0].clone();
+    let lost = FrameRef::file(frame.timestamp, "lost.png".into());
+    view.depth = vec![frame.clone(), lost, frame.clone(), frame];
+    let bench = Workbench::new(&recording.sensor, MeasureOptions::default());
+    let (_, frames) = TargetFrames::of(&view, &bench).expect("a target");
+    assert_eq!(frames.map(|(number, _)| number).collect::<Vec<usize>>(), [0, 2, 3]);
 }
 
 /// A frame left from the previous view, as drivers deliver when a recording begins, is not temporal noise.
