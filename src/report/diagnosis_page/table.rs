@@ -85,6 +85,9 @@ pub(super) fn advice(f: &Finding) -> String {
         (Status::OneOf, None) => "add views at other distances and tilts",
         (Status::Unexplained, None) => "vary one condition at a time to find its cause",
         (Status::Recalibrate, _) => "run `kinoise calibrate` again",
+        (Status::NotIdentifiable, _) if f.statistic != Statistic::Bias => {
+            "add views at other distances and tilts"
+        }
         (Status::NotIdentifiable, _) => {
             "measure the distance from sensor to target with a tape in a few views at different distances, write it into \
              each view's view.json as “reference_distance_m”, and diagnose again"
