@@ -6,11 +6,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::odds::{bias, odds};
 use crate::camera::Camera;
+use crate::diagnose::search::rows::Rows;
 use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
 use crate::diagnose::views::samples::in_patches;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::diagnose::views::tiles::{SIDE, rim_px};
+use crate::solve::plane_equations;
 use crate::terms::PixelContext;
 
 /// Pixel-frames of a patch, and how many of them have no measurement.
@@ -21,6 +23,8 @@ pub struct Cell<'a> {
     pub asked: f64,
     /// See [`bias`], for the share that the view usually loses.
     pub bias: f64,
+    /// Log odds of its twin's losses above those of no loss; 0 without a twin.
+    pub expected: f64,
     /// Whether it is compared with a twin and it, a neighbour or one of their twins loses something.
     pub differs: bool,
 }
@@ -49,6 +53,7 @@ pub fn cells<'a>(patches: &'a [Vec<Patch>], together: &[f64]) -> Vec<Vec<Cell<'a
             lost,
             asked,
             bias: bias(usual, asked, together),
+            expected: 0.0,
             differs: false,
         };
         view.iter().map(cell).collect()
@@ -104,30 +109,27 @@ fn key(cell: &Cell<'_>, rim: f64) -> (u32, u32, bool) {
     (at(cell.place.v), at(cell.place.u), cell.place.edge < rim)
 }
 
-/// Log odds of the losses at the same places of the twins, above those of no loss. Drops cells without a
+/// Sets what is expected of the cells by the losses at the same places of their twins. Drops cells without a
 /// twin.
-pub fn expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) -> Vec<Vec<f64>> {
-    let of_view = |(mine, theirs): (&mut Vec<Cell<'_>>, &Vec<Cell<'_>>)| {
+pub fn set_expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f64) {
+    for (mine, theirs) in cells.iter_mut().zip(twins) {
         let theirs: BTreeMap<_, _> = theirs
             .iter()
             .map(|c| (key(c, rim), (c.odds() - c.bias - odds(0.0), c.lost > 0.0)))
             .collect();
-        mine.retain(|c| theirs.contains_key(&key(c, rim)));
-        let (expected, loses): (Vec<f64>, Vec<bool>) = mine
-            .iter()
-            .map(|c| {
-                let (expected, loses) = theirs[&key(c, rim)];
-                (expected, loses || c.lost > 0.0)
-            })
-            .unzip();
+        let mut loses = Vec::new();
+        mine.retain_mut(|c| {
+            let Some((expected, lost)) = theirs.get(&key(c, rim)) else { return false };
+            c.expected = *expected;
+            loses.push(*lost || c.lost > 0.0);
+            true
+        });
         // A clump seen in one run could have lain next to it in the other.
         let differs: Vec<bool> = (0..mine.len())
             .map(|i| (0..mine.len()).any(|j| loses[j] && touch(&mine[i], &mine[j])))
             .collect();
         mine.iter_mut().zip(differs).for_each(|(c, differs)| c.differs = differs);
-        expected
-    };
-    cells.iter_mut().zip(twins).map(of_view).collect()
+    }
 }
 
 /// Every tile as a cell, to locate and size losses, not to detect them.
@@ -136,7 +138,7 @@ pub fn fine<'a>(survey: &'a Survey, margins: &Margins) -> Vec<Vec<Cell<'a>>> {
         let held = v.patches().filter(|(place, _)| margins.hold(place));
         held.map(|(place, t)| {
             let (lost, asked) = (t.asked * t.missing, t.asked);
-            Cell { place, lost, asked, bias: 0.0, differs: false }
+            Cell { place, lost, asked, bias: 0.0, expected: 0.0, differs: false }
         })
         .collect()
     };
@@ -170,69 +172,30 @@ pub const FEW: f64 = 4.0;
 /// Cells closer than this many sides are neighbours, including diagonal ones.
 const APART: f64 = 1.5;
 
-/// Applies the inverse covariance of a view's cells.
-pub struct Whitener {
-    weights: Vec<f64>,
-    slopes: Vec<Vector3<f64>>,
-    inverse: Matrix3<f64>,
-    scatter: Scatter,
-}
-
-impl Whitener {
-    pub fn of(cells: &[Cell], scatter: Scatter) -> Self {
-        let of = |c: &Cell| if c.differs { scatter.differing } else { scatter.cell };
-        let weights: Vec<f64> = cells.iter().map(|c| 1.0 / (scatter.clump * of(c))).collect();
-        let slopes: Vec<_> =
-            cells.iter().map(|c| Vector3::new(1.0, c.place.x, c.place.y)).collect();
-        let tight = Vector3::new(1.0 / scatter.level, 1.0 / scatter.slope, 1.0 / scatter.slope);
-        let inner = slopes
-            .iter()
-            .zip(&weights)
-            .fold(Matrix3::from_diagonal(&tight), |m, (n, w)| m + n * n.transpose() * *w);
-        // Positive definite thanks to its diagonal.
-        let inverse = inner.try_inverse().unwrap_or_else(Matrix3::zeros);
-        Whitener { weights, slopes, inverse, scatter }
-    }
-
-    /// Returns C^-1 y by the Woodbury identity.
-    pub fn solve(&self, y: &[f64]) -> Vec<f64> {
-        let own = self.own(y);
-        let left = self.slopes.iter().zip(y).map(|(n, y)| y - n.dot(&own));
-        left.zip(&self.weights).map(|(left, w)| w * left).collect()
-    }
-
-    /// Estimates the view's level and slopes.
-    fn own(&self, y: &[f64]) -> Vector3<f64> {
-        let cells = self.slopes.iter().zip(&self.weights).zip(y);
-        self.inverse * cells.fold(Vector3::zeros(), |s, ((n, w), y)| s + n * (*w * *y))
-    }
-
-    /// Draws log odds of a view without an effect.
-    pub fn draw(&self, mut normal: impl FnMut() -> f64) -> Vec<f64> {
-        let s = &self.scatter;
-        let own = Vector3::new(
-            s.level.sqrt() * normal(),
-            s.slope.sqrt() * normal(),
-            s.slope.sqrt() * normal(),
-        );
-        let cells = self.slopes.iter().zip(&self.weights);
-        cells.map(|(n, w)| n.dot(&own) + w.recip().sqrt() * normal()).collect()
-    }
-}
-
 impl Scatter {
+    /// A view's log odds, weighted, with its level and slopes as nuisances.
+    pub fn rows(&self, cells: &[Cell<'_>], left: &[f64]) -> Option<Rows<'static>> {
+        let of = |c: &Cell<'_>| if c.differs { self.differing } else { self.cell };
+        let weights: Vec<f64> = cells.iter().map(|c| 1.0 / (self.clump * of(c))).collect();
+        let plane: Vec<f64> = cells.iter().flat_map(|c| [1.0, c.place.x, c.place.y]).collect();
+        let precision = [self.level, self.slope, self.slope].map(f64::recip);
+        Rows::new(left, weights, &plane, precision.len(), &precision)
+    }
+
     /// Scatter of the log odds `left`, at least `min`: the views' levels and slopes by least squares, then
     /// the cells about them.
     pub fn of(views: &[Vec<Cell>], left: &[Vec<f64>], min: Scatter) -> Self {
         let (mut sums, mut n) = ([0.0; 4], [0.0; 4]);
         let mut neighbours = Neighbours::default();
         for (cells, left) in views.iter().zip(left).filter(|(cells, _)| !cells.is_empty()) {
-            let loose = Scatter { level: 1e6, slope: 4.0, cell: 1.0, differing: 1.0, clump: 4.0 };
-            let w = Whitener::of(cells, loose);
-            let own = w.own(left);
+            let points = cells.iter().zip(left).map(|(c, y)| ([c.place.x, c.place.y], *y, 0.25));
+            let (mut a, b) = plane_equations(points);
+            a += Matrix3::from_diagonal(&Vector3::new(1e-6, 0.25, 0.25));
+            let own = a.lu().solve(&b).unwrap_or_default();
             sums[0] += (left.iter().sum::<f64>() / left.len().max(1) as f64).powi(2);
             sums[1] += own.y.powi(2) + own.z.powi(2);
-            let off: Vec<f64> = w.slopes.iter().zip(left).map(|(n, y)| y - n.dot(&own)).collect();
+            let plane = |c: &Cell| own.x + own.y * c.place.x + own.z * c.place.y;
+            let off: Vec<f64> = cells.iter().zip(left).map(|(c, y)| y - plane(c)).collect();
             for (cell, y) in cells.iter().zip(&off) {
                 let kind = 2 + usize::from(cell.differs);
                 sums[kind] += y * y;

@@ -6,7 +6,6 @@
 
 pub mod cells;
 mod clumps;
-mod dropout_cells;
 pub mod few;
 pub mod fit;
 pub mod forms;
@@ -27,10 +26,9 @@ use crate::diagnose::views::layers::Survey;
 use crate::diagnose::views::margins::Margins;
 use crate::diagnose::views::tiles::rim_px;
 use crate::rng::Seed;
-use crate::terms::{Axis, Extent};
-use cells::{Cell, MIN_SCATTER, USUAL, cells, expected, fine, patches};
+use crate::terms::Extent;
+use cells::{Cell, MIN_SCATTER, USUAL, cells, fine, patches, set_expected};
 use clumps::frames_together;
-use dropout_cells::DropoutCells;
 use few::few_losses;
 use hard_end::{CloseLook, HardEnd, blur};
 use points::points_of_pixels;
@@ -86,11 +84,12 @@ pub fn missing(
     let margins = Margins::of(fields);
     let (large, fine) = (patches(survey, camera, &margins), fine(survey, &margins));
     let mut mine = cells(&large, &frames_together(fields));
-    let expected = twins.map(|(fields, survey)| {
+    if let Some((fields, survey)) = twins {
         let twins = patches(survey, camera, &margins);
-        expected(&mut mine, &cells(&twins, &frames_together(fields)), rim_px(camera))
-    });
-    let seen = DropoutCells { cells: mine, fine, region_given, second, expected };
+        set_expected(&mut mine, &cells(&twins, &frames_together(fields)), rim_px(camera));
+    }
+    let beside_twins = twins.is_some();
+    let seen = DropoutCells { cells: mine, fine, region_given, second, beside_twins };
     let look = CloseLook {
         blur: &|z| blur(survey, z),
         points: &|span| points_of_pixels(fields, rays, &margins, span),
@@ -115,6 +114,30 @@ pub fn missing(
     outcome
 }
 
+/// Losses of the views on the target.
+#[derive(Clone)]
+struct DropoutCells<'a> {
+    /// Patches large enough to judge.
+    cells: Vec<Vec<Cell<'a>>>,
+    /// Smallest patches.
+    fine: Vec<Vec<Cell<'a>>>,
+    /// Whether a view's region was given.
+    region_given: Vec<bool>,
+    /// Whether each view is in the second half.
+    second: Vec<bool>,
+    beside_twins: bool,
+}
+
+impl DropoutCells<'_> {
+    /// Copy without the patches that a hard end of the range touches.
+    fn inside(&self, end: &HardEnd) -> Self {
+        let mut rest = self.clone();
+        let views = rest.cells.iter_mut().chain(&mut rest.fine);
+        views.for_each(|v| v.retain(|c| !end.touches(c)));
+        rest
+    }
+}
+
 /// Inputs of the dropout search.
 struct DropoutSearch<'a> {
     reach: &'a Extent,
@@ -135,11 +158,10 @@ impl DropoutSearch<'_> {
             return outcome;
         }
         let shapes = Shapes::of(self.reach, self.camera, times(views));
-        let nothing = || views.iter().map(|v| vec![0.0; v.len()]).collect();
-        let mut explained: Vec<Vec<f64>> = seen.expected.clone().unwrap_or_else(nothing);
-        let mut taken: Vec<Axis> = Vec::new();
+        let mut open = shapes.clone();
+        let mut explained: Vec<Vec<f64>> =
+            views.iter().map(|v| v.iter().map(|c| c.expected).collect()).collect();
         while outcome.findings.len() < MAX_FINDINGS {
-            let open = shapes.beside(&taken);
             let of = |steps: &[Step], min_scatter| {
                 Round::of(views, &explained, (steps, &open.curves), min_scatter, self.seed)
             };
@@ -147,7 +169,7 @@ impl DropoutSearch<'_> {
             if outcome.findings.is_empty() {
                 outcome.detectable = detectable(&always.ledger, &shapes.steps, always.threshold());
             }
-            if taken.is_empty() {
+            if outcome.findings.is_empty() && outcome.ends.is_empty() {
                 outcome.notes.extend(lost_everywhere(always.ledger.base));
             }
             // Steps that begin mid-session are tried only where no constant one is found. Few views show the
@@ -166,7 +188,8 @@ impl DropoutSearch<'_> {
             let p = noise.p(counts);
             let told = |won: &Judged| {
                 let rivals = rivals(std::iter::once(won).chain(judged));
-                let finding = self.reporter(seen, ledger.base).finding(won, &rivals, TESTS * p);
+                let reporter = DropoutReporter { search: self, seen, base: ledger.base };
+                let finding = reporter.finding(won, &rivals, TESTS * p);
                 Finding { replicated: ledger.replicate(won, &seen.second), ..finding }
             };
             let finding = told(won);
@@ -177,14 +200,14 @@ impl DropoutSearch<'_> {
             let later = if end.is_none() { ledger.later(won) } else { None };
             let more = ledger.explained(later.as_ref().unwrap_or(won));
             explained.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(e, m)| *e += m);
-            taken.push(won.shape.axis());
+            open.drop_axis(won.shape.axis());
             match end {
                 Some(end) => outcome.take_end(&end),
                 None => outcome.findings.push(later.as_ref().map_or(finding, told)),
             }
         }
         // Total counts are not compared with a twin's.
-        if outcome.findings.is_empty() && seen.expected.is_none() {
+        if outcome.findings.is_empty() && !seen.beside_twins {
             return self.few(seen, outcome);
         }
         outcome
@@ -194,13 +217,14 @@ impl DropoutSearch<'_> {
     /// still be detected when any single view is left out. A hard end of the range is exempt: the farthest
     /// view may cross it alone.
     fn won(&self, round: &Round<'_>, seen: &DropoutCells<'_>) -> Option<(usize, f64)> {
-        if seen.expected.is_none() {
+        if !seen.beside_twins {
             return round.won();
         }
         let Round { ledger, judged, .. } = round;
         let (first, gain) = round.won()?;
         let won = &judged[first];
-        let finding = self.reporter(seen, ledger.base).finding(won, &rivals([won]), 0.0);
+        let reporter = DropoutReporter { search: self, seen, base: ledger.base };
+        let finding = reporter.finding(won, &rivals([won]), 0.0);
         let ends = self.end(&finding, ledger.base).is_some();
         if ends { Some((first, gain)) } else { round.won_beyond_one_view() }
     }
@@ -211,7 +235,8 @@ impl DropoutSearch<'_> {
         let Some((foot, p)) = few_losses(&seen.fine, rim, self.reach, level, self.seed) else {
             return outcome;
         };
-        let finding = self.reporter(seen, 0.0).finding(&foot, &rivals([&foot]), TESTS * p);
+        let reporter = DropoutReporter { search: self, seen, base: 0.0 };
+        let finding = reporter.finding(&foot, &rivals([&foot]), TESTS * p);
         // A view whose corner is cut off by a hard end looks like the foot of a rise.
         match self.end(&finding, 0.0) {
             Some(end) if touches(&seen.fine, &end) => return self.within(&end, seen),
@@ -237,16 +262,6 @@ impl DropoutSearch<'_> {
         let step = Step::of(found.effect?, |name| found.value(name))?;
         let error = found.parameters.get("width_m").and_then(|w| w.get("std_error")?.as_f64());
         HardEnd::of(&step, error.unwrap_or(f64::INFINITY), base, &self.look)
-    }
-
-    fn reporter<'b>(&'b self, seen: &'b DropoutCells<'b>, base: f64) -> DropoutReporter<'b> {
-        DropoutReporter {
-            fine: &seen.fine,
-            region_given: &seen.region_given,
-            base,
-            reach: self.reach,
-            camera: self.camera,
-        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::fit::{Fitted, fit};
 use super::points::{BINS, Point, bounded, misfit, part, points};
 use super::search::{Judged, Losses};
 use super::shapes::{Shape, Step};
-use crate::camera::Camera;
+use super::{DropoutCells, DropoutSearch};
 use crate::diagnose::diagnosis::{Alternative, Curve, Detectable, Finding, Size, Status};
 use crate::diagnose::edges::shadow::Band;
 use crate::diagnose::finding::naming::{MIN_PROBABILITY, ln_odds, none_of_these, physics};
@@ -17,7 +17,7 @@ use crate::diagnose::finding::shape::digits;
 use crate::diagnose::views::field::Field;
 use crate::effects;
 use crate::stats::range;
-use crate::terms::{Axis, Basis, Coordinate, Extent, Statistic, corner_radius};
+use crate::terms::{Axis, Basis, Coordinate, Statistic, corner_radius};
 
 /// Lost share from which an effect matters.
 const MATTERS: f64 = 0.05;
@@ -40,15 +40,11 @@ pub fn rivals<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Vec<(&'static
 }
 
 /// Writes findings from the losses of the views.
-pub struct DropoutReporter<'a> {
-    /// Losses of the views in the smallest patches.
-    pub fine: &'a [Vec<Cell<'a>>],
-    /// Whether each view's region was given.
-    pub region_given: &'a [bool],
+pub(super) struct DropoutReporter<'a> {
+    pub search: &'a DropoutSearch<'a>,
+    pub seen: &'a DropoutCells<'a>,
     /// Share lost everywhere.
     pub base: f64,
-    pub reach: &'a Extent,
-    pub camera: &'a Camera,
 }
 
 /// Place of a cell on an axis, if it counts.
@@ -93,7 +89,7 @@ impl DropoutReporter<'_> {
         finding.interval = interval(&fitted, span);
         // Relative to all pixel-frames, including those before it began.
         let there: f64 = all.iter().map(|p| p.asked).sum();
-        let asked: f64 = self.fine.iter().flatten().map(|c| c.asked).sum();
+        let asked: f64 = self.seen.fine.iter().flatten().map(|c| c.asked).sum();
         finding.size.sigma = there / asked.max(1.0) * mean(&all, |p| loss(p.x) - self.base);
         finding.curve = Some(binned(&all, step.axis, span, loss));
         true
@@ -102,16 +98,16 @@ impl DropoutReporter<'_> {
     fn span(&self, step: Step) -> [f64; 2] {
         match step.axis {
             Axis::Theta if step.incidence => {
-                range(self.fine.iter().flatten().map(|c| step.at(c.place)))
+                range(self.seen.fine.iter().flatten().map(|c| step.at(c.place)))
             }
-            Axis::Theta => self.reach.theta,
-            _ => self.reach.z,
+            Axis::Theta => self.search.reach.theta,
+            _ => self.search.reach.z,
         }
     }
 
     fn points(&self, step: Step) -> Vec<Point> {
         let at = |c: &Cell<'_>| (!step.before(c.place.session_s)).then(|| step.at(c.place));
-        bounded(points(self.fine, &at, self.span(step)), &step, self.region_given)
+        bounded(points(&self.seen.fine, &at, self.span(step)), &step, &self.seen.region_given)
     }
 
     /// Fits the step to these losses; `None` where it is no nearer to them than no step, or where its
@@ -133,14 +129,14 @@ impl DropoutReporter<'_> {
     fn curve(&self, basis: &Basis, finding: &mut Finding) {
         let (span, at): ([f64; 2], At) = match basis {
             Basis::Curve { over, low, high, .. } => {
-                let (over, corner) = (*over, corner_radius(self.camera));
+                let (over, corner) = (*over, corner_radius(self.search.camera));
                 let unit = if over == Coordinate::Radius { corner } else { 1.0 };
                 let value = move |c: &Cell<'_>| Some(unit * over.value(c.place));
                 ([unit * low, unit * high], Box::new(value))
             }
-            _ => ([0.0, self.camera.width as f64], Box::new(|c| Some(c.place.u))),
+            _ => ([0.0, self.search.camera.width as f64], Box::new(|c| Some(c.place.u))),
         };
-        self.shapeless(&points(self.fine, &at, span), basis.axis(), span, finding);
+        self.shapeless(&points(&self.seen.fine, &at, span), basis.axis(), span, finding);
     }
 
     /// Fills in what was measured, without a law.
@@ -292,11 +288,8 @@ fn weighed(name: &'static str, gain: f64, rivals: &Rivals) -> Vec<Alternative> {
     let curve = curves.map(|r| r.1).fold(0.0, f64::max);
     let mut odds = vec![(name, 1.0)];
     let rivals = rivals.iter().filter_map(|&(id, gain)| Some((card(id)?, gain)));
-    odds.extend(
-        rivals
-            .filter(|r| r.0 != name)
-            .map(|(id, gain)| (id, ln_odds((gain - best).clamp(-60.0, 0.0)).exp())),
-    );
+    let behind = |gain: f64| ln_odds((gain - best).clamp(-60.0, 0.0)).exp();
+    odds.extend(rivals.filter(|r| r.0 != name).map(|(id, gain)| (id, behind(gain))));
     let total: f64 = odds.iter().map(|o| o.1).sum();
     let some = 1.0 - none_of_these(gain, curve, NAME_ADEQUATE);
     odds.into_iter()

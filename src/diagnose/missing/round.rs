@@ -25,10 +25,10 @@ impl<'a> Round<'a> {
         min_scatter: Scatter,
         seed: Seed,
     ) -> Option<Self> {
-        let ledger = Losses::new(views, explained);
+        let ledger = Losses::new(views, explained)?;
         let (first, _) = ledger.judge(steps, curves, None);
         let all: Vec<usize> = (0..first.len()).collect();
-        let ledger = ledger.scattered_as_left_by(&first[choose(&first, &all)?], min_scatter);
+        let ledger = ledger.scattered_as_left_by(&first[choose(&first, &all)?], min_scatter)?;
         let (judged, noise) = ledger.judge(steps, curves, Some(seed));
         Some(Round { ledger, judged, noise })
     }

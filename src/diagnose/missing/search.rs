@@ -1,10 +1,9 @@
 //! Judges which shape the losses follow, on views left out of its fit.
 
-use nalgebra::{DMatrix, DVector};
-use rand_distr::{Distribution, StandardNormal};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::cells::{Cell, Scatter, USUAL, Whitener};
+use super::cells::{Cell, Scatter, USUAL};
 use super::odds::{odds, share};
 use super::shapes::{Shape, Step, begun};
 use crate::diagnose::checks::replication::Halves;
@@ -12,6 +11,7 @@ use crate::diagnose::options::POWER_80;
 use crate::diagnose::search::evidence::{Evidence, gain};
 use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::Null;
+use crate::diagnose::search::rows::Rows;
 use crate::rng::Seed;
 use crate::terms::Basis;
 
@@ -23,16 +23,13 @@ const CURVE_PRECISION: f64 = 0.05;
 /// Nats by which a step that begins mid-session must beat the same step without a start: twenty to one.
 const CLEARLY: f64 = 3.0;
 
-/// Information below this is ignored, nats.
-const NO_SAY: f64 = 1e-6;
-
 /// Losses to be judged: log odds above the share lost everywhere.
 pub struct Losses<'a> {
     pub views: &'a [Vec<Cell<'a>>],
     /// Log odds left once earlier findings are subtracted.
     pub left: Vec<Vec<f64>>,
     pub base: f64,
-    whiteners: Vec<Whitener>,
+    rows: Vec<Rows<'static>>,
 }
 
 /// Times of the views since the start of the session, s.
@@ -47,19 +44,6 @@ pub struct Judged {
     /// Gain over all views, nats.
     pub gain: f64,
     pub coefficients: Vec<f64>,
-}
-
-/// A step's column and information in each view.
-struct Column {
-    step: Step,
-    by_view: Vec<Vec<f32>>,
-    a: Vec<f64>,
-}
-
-impl Column {
-    fn scores(&self, whitened: &[Vec<f64>]) -> Vec<f64> {
-        self.by_view.iter().zip(whitened).map(|(g, w)| dot(g, w)).collect()
-    }
 }
 
 /// Gain (nats) and size of a step from its information and score in each view. Each view is predicted from
@@ -85,18 +69,25 @@ fn usual(odds: &[Vec<f64>]) -> f64 {
     if share(at(0.5)) < MUCH { at(0.5) } else { at(0.1) }
 }
 
-/// Dot product in eight sums, so that no addition waits for the one before.
-fn dot(g: &[f32], w: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    for (g, w) in g.chunks(sums.len()).zip(w.chunks(sums.len())) {
-        sums.iter_mut().zip(g.iter().zip(w)).for_each(|(sum, (g, w))| *sum += f64::from(*g) * w);
+/// Gain (nats) and coefficients of a shape of this evidence.
+fn gained(shape: &Shape, views: &[Evidence]) -> Option<(f64, Vec<f64>)> {
+    match shape {
+        Shape::Step(step) => {
+            let [a, b] = [|e: &Evidence| e.a[0], |e: &Evidence| e.b[0]]
+                .map(|of| views.iter().map(of).collect::<Vec<f64>>());
+            let (gain, size) = predicted(&a, &b);
+            Some((gain - step.cost(), vec![size]))
+        }
+        Shape::Curve(_) => {
+            let gain = gain(views, CURVE_PRECISION)?;
+            Some((gain.total, gain.beta.as_slice().to_vec()))
+        }
     }
-    sums.iter().sum()
 }
 
 impl<'a> Losses<'a> {
     /// Subtracts `explained`, which is in log odds above the base.
-    pub fn new(views: &'a [Vec<Cell<'a>>], explained: &[Vec<f64>]) -> Self {
+    pub fn new(views: &'a [Vec<Cell<'a>>], explained: &[Vec<f64>]) -> Option<Self> {
         let mut left: Vec<Vec<f64>> = views
             .iter()
             .zip(explained)
@@ -107,132 +98,82 @@ impl<'a> Losses<'a> {
         for (y, c) in left.iter_mut().flatten().zip(views.iter().flatten()) {
             *y -= c.bias + level;
         }
-        let whiteners = views.iter().map(|v| Whitener::of(v, USUAL)).collect();
-        Losses { views, left, base: share(level), whiteners }
+        Losses::scattered(views, left, share(level), USUAL)
+    }
+
+    fn scattered(
+        views: &'a [Vec<Cell<'a>>],
+        left: Vec<Vec<f64>>,
+        base: f64,
+        scatter: Scatter,
+    ) -> Option<Self> {
+        let rows = views.iter().zip(&left).map(|(cells, left)| scatter.rows(cells, left));
+        let rows = rows.collect::<Option<_>>()?;
+        Some(Losses { views, left, base, rows })
     }
 
     /// Re-estimates the scatter from what `best` leaves, bounded below by `min_scatter`.
-    pub fn scattered_as_left_by(self, best: &Judged, min_scatter: Scatter) -> Self {
+    pub fn scattered_as_left_by(&self, best: &Judged, min_scatter: Scatter) -> Option<Self> {
         let explained = self.explained(best);
         let mut left = self.left.clone();
         left.iter_mut().flatten().zip(explained.iter().flatten()).for_each(|(y, e)| *y -= e);
         let scatter = Scatter::of(self.views, &left, min_scatter);
-        let whiteners = self.views.iter().map(|v| Whitener::of(v, scatter)).collect();
-        Losses { whiteners, ..self }
+        Losses::scattered(self.views, self.left.clone(), self.base, scatter)
     }
 
     /// Log odds that a shape adds to each cell.
     pub fn explained(&self, judged: &Judged) -> Vec<Vec<f64>> {
         let size = &judged.coefficients;
-        let views = self.views.iter();
-        match &judged.shape {
-            Shape::Step(step) => views
-                .map(|v| step.column(v, self.base).iter().map(|h| size[0] * h).collect())
-                .collect(),
-            Shape::Curve(basis) => {
-                views.map(|v| v.iter().map(|c| basis.value(size, c.place)).collect()).collect()
-            }
-        }
+        let of = |c: &Cell<'_>| match &judged.shape {
+            Shape::Step(step) => size[0] * step.adds(c, self.base),
+            Shape::Curve(basis) => basis.value(size, c.place),
+        };
+        self.views.iter().map(|v| v.iter().map(of).collect()).collect()
     }
 
-    fn column(&self, step: Step) -> Column {
-        let columns: Vec<Vec<f64>> = self.views.iter().map(|v| step.column(v, self.base)).collect();
-        let information = |(g, w): (&Vec<f64>, &Whitener)| {
-            g.iter().zip(w.solve(g)).map(|(g, w)| g * w).sum::<f64>()
+    /// Evidence of each view on a step's size, or on a curve's coefficients.
+    fn evidence(&self, shape: &Shape) -> Vec<Evidence> {
+        let of_view = |(rows, cells): (&Rows<'_>, &Vec<Cell<'_>>)| match shape {
+            Shape::Step(step) => rows.reduce(1, |i, g| g[0] = step.adds(&cells[i], self.base)),
+            Shape::Curve(basis) => rows.reduce(basis.count(), |i, g| basis.fill(cells[i].place, g)),
         };
-        let a: Vec<f64> = columns.iter().zip(&self.whiteners).map(information).collect();
-        // Views that the step does not affect are left empty.
-        let narrow = |(g, a): (&Vec<f64>, &f64)| {
-            g.iter().take(if *a > NO_SAY { g.len() } else { 0 }).map(|h| *h as f32).collect()
-        };
-        let by_view = columns.iter().zip(&a).map(narrow).collect();
-        Column { step, by_view, a }
+        self.rows.iter().zip(self.views).map(of_view).collect()
     }
 
     /// Gain left without the view it depends on most, nats. A view and its twin differ in where clumps of
     /// losses happen to lie: one clump in a corner of the steepest view is no law of the tilt.
     pub fn beyond_one_view(&self, judged: &Judged) -> f64 {
-        let without: Box<dyn Fn(usize) -> f64> = match &judged.shape {
-            Shape::Step(step) => {
-                let (a, b) = self.information_and_score(*step);
-                let beside = |of: &[f64], one: usize| [&of[..one], &of[one + 1..]].concat();
-                let cost = step.cost();
-                Box::new(move |one| predicted(&beside(&a, one), &beside(&b, one)).0 - cost)
-            }
-            Shape::Curve(basis) => {
-                let evidence = self.evidence(basis);
-                Box::new(move |one| {
-                    let mut rest = evidence.clone();
-                    rest.remove(one);
-                    gain(&rest, CURVE_PRECISION).map_or(0.0, |rest| rest.total)
-                })
-            }
+        let evidence = self.evidence(&judged.shape);
+        let without = |one: usize| {
+            let mut rest = evidence.clone();
+            rest.remove(one);
+            gained(&judged.shape, &rest).map_or(0.0, |g| g.0)
         };
-        (0..self.views.len()).map(without).fold(judged.gain, f64::min)
-    }
-
-    /// A step's information and score in every view.
-    fn information_and_score(&self, step: Step) -> (Vec<f64>, Vec<f64>) {
-        let column = self.column(step);
-        let scores = column.scores(&self.solve(&self.left));
-        (column.a, scores)
-    }
-
-    /// Multiplies each view's log odds by the inverse of their covariance.
-    fn solve(&self, y: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        self.whiteners.iter().zip(y).map(|(w, y)| w.solve(y)).collect()
+        (0..evidence.len()).map(without).fold(judged.gain, f64::min)
     }
 
     /// Whether both halves of the views lose by this shape.
     pub fn replicate(&self, judged: &Judged, second: &[bool]) -> Option<bool> {
-        match &judged.shape {
-            Shape::Step(step) => {
-                let (a, b) = self.information_and_score(*step);
-                let views = a.into_iter().zip(b).zip(second).filter(|((a, _), _)| *a > 0.0);
-                let (views, second): (Vec<_>, Vec<_>) =
-                    views.map(|((a, b), second)| (Evidence::of_one(a, b), *second)).unzip();
-                Halves::of(&views, &second, 0.0, &[1])?.replicate(&[0], 0.0)
-            }
-            Shape::Curve(basis) => {
-                let views = self.evidence(basis).into_iter().zip(self.views).zip(second);
-                let views = views.filter(|((_, cells), _)| !cells.is_empty());
-                let (evidence, second): (Vec<_>, Vec<_>) =
-                    views.map(|((evidence, _), second)| (evidence, *second)).unzip();
-                Halves::of(&evidence, &second, CURVE_PRECISION, &[basis.count()])?
-                    .replicate(&[0], 0.0)
-            }
-        }
+        let each = self.evidence(&judged.shape).into_iter().zip(second.iter().copied());
+        // Views that see nothing of it have no say.
+        let (views, second): (Vec<_>, Vec<_>) = each.filter(|(e, _)| e.a.trace() > 0.0).unzip();
+        let (count, prior) = match &judged.shape {
+            Shape::Step(_) => (1, 0.0),
+            Shape::Curve(basis) => (basis.count(), CURVE_PRECISION),
+        };
+        Halves::of(&views, &second, prior, &[count])?.replicate(&[0], 0.0)
     }
 
     /// Returns the constant step `won` with a start mid-session, if that does clearly better. The scatter of
     /// the views is then not trusted below the usual.
     pub fn later(&self, won: &Judged) -> Option<Judged> {
         let Shape::Step(always @ Step { since_s: None, .. }) = won.shape else { return None };
-        let (left, whiteners) = (self.left.clone(), Vec::new());
-        let careful = Losses { left, whiteners, ..*self }.scattered_as_left_by(won, USUAL);
+        let careful = self.scattered_as_left_by(won, USUAL)?;
         let best = |steps: &[Step]| careful.judge(steps, &[], None).0.into_iter().next();
         let (always, later) = (best(&[always])?, best(&begun(&[always], times(self.views)))?);
         // In the scatter that its rivals were judged with.
         let gain = won.gain + later.gain - always.gain;
         (later.gain > always.gain + CLEARLY).then_some(Judged { gain, ..later })
-    }
-
-    fn evidence(&self, basis: &Basis) -> Vec<Evidence> {
-        let k = basis.count();
-        let of = |v: usize| {
-            let cells = &self.views[v];
-            let mut rows = vec![0.0; cells.len() * k];
-            rows.chunks_exact_mut(k).zip(cells).for_each(|(row, c)| basis.fill(c.place, row));
-            let g = DMatrix::from_row_slice(cells.len(), k, &rows);
-            let mut a = DMatrix::zeros(k, k);
-            for j in 0..k {
-                let w = DVector::from_vec(self.whiteners[v].solve(g.column(j).as_slice()));
-                a.set_column(j, &(g.transpose() * w));
-            }
-            let w = DVector::from_vec(self.whiteners[v].solve(&self.left[v]));
-            Evidence { a, b: g.transpose() * w }
-        };
-        (0..self.views.len()).map(of).collect()
     }
 
     /// Judges all shapes on these losses, and simulates the largest gain that noise alone brings.
@@ -242,47 +183,62 @@ impl<'a> Losses<'a> {
         curves: &[Basis],
         null: Option<Seed>,
     ) -> (Vec<Judged>, NoiseGains) {
-        let columns: Vec<Column> = steps.par_iter().map(|s| self.column(*s)).collect();
-        let whitened = self.solve(&self.left);
-        let mut judged: Vec<Judged> = columns
-            .iter()
-            .map(|c| {
-                let (gain, size) = predicted(&c.a, &c.scores(&whitened));
-                let gain = gain - c.step.cost();
-                Judged { shape: Shape::Step(c.step), gain, coefficients: vec![size] }
-            })
-            .collect();
-        let mut nulls = Vec::new();
-        for basis in curves {
-            let evidence = self.evidence(basis);
-            let Some(won) = gain(&evidence, CURVE_PRECISION) else { continue };
-            nulls.extend(Null::of(&evidence, 0, CURVE_PRECISION));
-            let coefficients = won.beta.as_slice().to_vec();
-            let shape = Shape::Curve(basis.clone());
-            judged.push(Judged { shape, gain: won.total, coefficients });
-        }
-        judged.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let Some(seed) = null else { return (judged, NoiseGains::default()) };
-        let draw = |replicate: u64| {
-            let mut rng = seed.stream(&format!("missing/null/{replicate}"));
-            let mut normal = || StandardNormal.sample(&mut rng);
-            let y: Vec<Vec<f64>> = self.whiteners.iter().map(|w| w.draw(&mut normal)).collect();
-            let whitened = self.solve(&y);
-            let gain = |c: &Column| predicted(&c.a, &c.scores(&whitened)).0 - c.step.cost();
-            let steps = columns.iter().map(gain).fold(0.0, f64::max);
-            nulls.iter().map(|n| n.draw(&mut rng)).fold(steps, f64::max)
+        let steps = steps.iter().map(|s| Shape::Step(*s));
+        let shapes: Vec<Shape> = steps.chain(curves.iter().cloned().map(Shape::Curve)).collect();
+        let evidence: Vec<_> = shapes.par_iter().map(|s| self.evidence(s)).collect();
+        let judge = |(shape, evidence): (&Shape, &Vec<Evidence>)| {
+            let (gain, coefficients) = gained(shape, evidence)?;
+            Some(Judged { shape: shape.clone(), gain, coefficients })
         };
-        (judged, NoiseGains::simulated(REPLICATES, MIN_EXCESS_OF_LOSSES, draw))
+        let mut judged: Vec<Judged> = shapes.iter().zip(&evidence).filter_map(judge).collect();
+        judged.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let noise = null.map(|seed| self.noise_gains(&shapes, &evidence, seed));
+        (judged, noise.unwrap_or_default())
+    }
+
+    /// Largest gains of these shapes under noise alone.
+    fn noise_gains(&self, shapes: &[Shape], evidence: &[Vec<Evidence>], seed: Seed) -> NoiseGains {
+        let (mut steps, mut information, mut nulls) = (Vec::new(), Vec::new(), Vec::new());
+        for (shape, views) in shapes.iter().zip(evidence) {
+            match shape {
+                Shape::Step(step) => {
+                    steps.push(*step);
+                    information.push(views.iter().map(|e| e.a[0]).collect::<Vec<f64>>());
+                }
+                Shape::Curve(_) => nulls.extend(Null::of(views, 0, CURVE_PRECISION)),
+            }
+        }
+        let of_view = |(v, rows): (usize, &Rows<'_>)| {
+            let noise = rows.noise(REPLICATES, &mut seed.stream(&format!("missing/views/{v}")));
+            let fill = |i: usize, g: &mut [f64]| {
+                for (g, step) in g.iter_mut().zip(&steps) {
+                    *g = step.adds(&self.views[v][i], self.base);
+                }
+            };
+            rows.scores(steps.len(), fill, &noise)
+        };
+        let scores: Vec<DMatrix<f64>> = self.rows.par_iter().enumerate().map(of_view).collect();
+        let draw = |replicate: u64| {
+            let of_step = |(k, step): (usize, &Step)| {
+                let b: Vec<f64> = scores.iter().map(|s| s[(k, replicate as usize)]).collect();
+                predicted(&information[k], &b).0 - step.cost()
+            };
+            let best = steps.iter().enumerate().map(of_step).fold(0.0, f64::max);
+            let mut rng = seed.stream(&format!("missing/curves/{replicate}"));
+            nulls.iter().map(|n| n.draw(&mut rng)).fold(best, f64::max)
+        };
+        NoiseGains::simulated(REPLICATES as u64, MIN_EXCESS_OF_LOSSES, draw)
     }
 
     /// Farthest whole steps detected with 80 % power; nearest, for losses below them.
     pub fn detectable(&self, steps: &[Step], threshold: f64) -> Vec<Step> {
         // The gain has mean a / 2 and standard deviation sqrt(a).
         let seen = |s: &&Step| {
-            let a: f64 = self.column(**s).a.iter().sum();
-            s.share == 1.0 && !s.incidence && 0.5 * a - POWER_80 * a.sqrt() > threshold
+            let a: f64 = self.evidence(&Shape::Step(**s)).iter().map(|e| e.a[0]).sum();
+            0.5 * a - POWER_80 * a.sqrt() > threshold
         };
-        let mut all: Vec<Step> = steps.iter().filter(seen).copied().collect();
+        let whole = steps.iter().filter(|s| s.share == 1.0 && !s.incidence);
+        let mut all: Vec<Step> = whole.filter(seen).copied().collect();
         // Least demanding first: the largest middle, or the smallest where losses lie below.
         all.sort_by(|a, b| (b.middle * b.width.signum()).total_cmp(&(a.middle * a.width.signum())));
         let mut best: Vec<Step> = Vec::new();
@@ -296,6 +252,6 @@ impl<'a> Losses<'a> {
 }
 
 /// Simulations of the null distribution.
-const REPLICATES: u64 = 300;
+const REPLICATES: usize = 300;
 /// Minimum mean excess of the noise's gains over their 90 % quantile, nats.
 pub const MIN_EXCESS_OF_LOSSES: f64 = 1.0;

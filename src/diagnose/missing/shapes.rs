@@ -76,10 +76,10 @@ impl Step {
         base + (1.0 - base) * self.share * logistic(x - self.middle, self.width)
     }
 
-    /// Log odds that it adds to each cell.
-    pub fn column(&self, cells: &[Cell<'_>], base: f64) -> Vec<f64> {
-        let of = |c: &Cell<'_>| odds(self.loss(self.at(c.place), base)) - odds(base);
-        cells.iter().map(|c| if self.before(c.place.session_s) { 0.0 } else { of(c) }).collect()
+    /// Log odds that it adds to a cell.
+    pub fn adds(&self, c: &Cell<'_>, base: f64) -> f64 {
+        let added = || odds(self.loss(self.at(c.place), base)) - odds(base);
+        if self.before(c.place.session_s) { 0.0 } else { added() }
     }
 }
 
@@ -223,12 +223,10 @@ impl Shapes {
         Shapes { steps, begun: begun(&usual, times), curves: curves(camera, reach) }
     }
 
-    /// Returns the shapes on other axes than these.
-    pub fn beside(&self, taken: &[Axis]) -> Self {
-        let mut open = self.clone();
-        open.steps.retain(|s| !taken.contains(&s.axis));
-        open.begun.retain(|s| !taken.contains(&s.axis));
-        open.curves.retain(|c| !taken.contains(&c.axis()));
-        open
+    /// Drops the shapes on this axis.
+    pub fn drop_axis(&mut self, axis: Axis) {
+        self.steps.retain(|s| s.axis != axis);
+        self.begun.retain(|s| s.axis != axis);
+        self.curves.retain(|c| c.axis() != axis);
     }
 }

@@ -4,7 +4,7 @@ use crate::diagnose::missing::points::points;
 use crate::plane::Plane;
 use crate::rng::Stream;
 use crate::simulate::kinect_v1;
-use crate::terms::PixelContext;
+use crate::terms::{Axis, PixelContext};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -82,14 +82,15 @@ fn find_beside(
     reach.session = of(|p| p.session_s);
     reach.light = [1.0, 1.0];
     let mut mine = cells(views, &vec![1.0; views.len()]);
-    let expected = twins
-        .map(|twins| expected(&mut mine, &cells(twins, &vec![1.0; twins.len()]), rim_px(camera)));
+    if let Some(twins) = twins {
+        set_expected(&mut mine, &cells(twins, &vec![1.0; twins.len()]), rim_px(camera));
+    }
     let seen = DropoutCells {
         cells: mine,
         fine: cells(views, &vec![1.0; views.len()]),
         region_given: vec![true; views.len()],
         second: (0..views.len()).map(|v| v % 2 == 1).collect(),
-        expected,
+        beside_twins: twins.is_some(),
     };
     let within = |[near, far]: [f64; 2]| {
         move |c: &Cell<'_>| Some(c.place.z).filter(|z| *z >= near && *z <= far)

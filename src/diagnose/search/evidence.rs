@@ -25,11 +25,6 @@ impl Evidence {
         Evidence { a: DMatrix::zeros(n, n), b: DVector::zeros(n) }
     }
 
-    /// Evidence on a single column.
-    pub fn of_one(a: f64, b: f64) -> Self {
-        Evidence { a: DMatrix::from_element(1, 1, a), b: DVector::from_element(1, b) }
-    }
-
     /// Evidence on the first `n` columns only.
     pub fn first(&self, n: usize) -> Self {
         Evidence { a: self.a.view((0, 0), (n, n)).into_owned(), b: self.b.rows(0, n).into_owned() }

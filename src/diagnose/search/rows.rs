@@ -31,17 +31,18 @@ impl<'a> Rows<'a> {
     /// `precision`, their prior precision about zero (0: free). `None` if the nuisances are collinear.
     pub fn new(
         response: &[f64],
-        weight: &'a [f64],
+        weight: impl Into<Cow<'a, [f64]>>,
         beside: &[f64],
         width: usize,
         precision: &[f64],
     ) -> Option<Self> {
+        let weight = weight.into();
         let mut samples = Vec::with_capacity(response.len() * (width + 1));
         for (row, y) in beside.chunks_exact(width).zip(response) {
             samples.extend_from_slice(row);
             samples.push(*y);
         }
-        let squares = squares(&samples, weight, width + 1);
+        let squares = squares(&samples, &weight, width + 1);
         let mut own = squares.view((0, 0), (width, width)).into_owned();
         let seen = squares.view((0, width), (width, 1)).column(0).into_owned();
         let p = precision.len();
@@ -49,7 +50,7 @@ impl<'a> Rows<'a> {
             own[(q, q)] += precision;
         }
         let inverse = own.view((0, 0), (p, p)).into_owned().try_inverse()?;
-        let (weight, precision) = (Cow::Borrowed(weight), precision.to_vec());
+        let precision = precision.to_vec();
         Some(Rows { weight, samples, precision, width, own, seen, inverse })
     }
 

@@ -39,7 +39,7 @@ impl ViewNoise {
 impl Rows<'_> {
     /// Draws the noise so many times, weighted and with the nuisances profiled out: one row per sample. Its
     /// products with columns are scores of their information's covariance.
-    fn noise(&self, draws: usize, rng: &mut Stream) -> DMatrix<f64> {
+    pub fn noise(&self, draws: usize, rng: &mut Stream) -> DMatrix<f64> {
         let (n, p) = (self.weight.len(), self.nuisances());
         let nuisances = DMatrix::from_fn(n, p, |i, q| self.sample(i)[q]);
         let weighted = DMatrix::from_fn(n, p, |i, q| self.weight[i] * nuisances[(i, q)]);
@@ -68,8 +68,8 @@ impl Rows<'_> {
         DMatrix::from_fn(m, self.weight.len(), |j, i| self.sample(i)[p + j]) * noise
     }
 
-    /// Scores of such noise on a candidate; `columns` fills one row of its columns.
-    fn scores(
+    /// Scores of such noise on a candidate, one column per draw; `columns` fills one row of its columns.
+    pub fn scores(
         &self,
         count: usize,
         mut columns: impl FnMut(usize, &mut [f64]),
