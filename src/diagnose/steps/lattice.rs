@@ -160,14 +160,18 @@ impl RawHistogram {
         Some(Step { is_of_depth: false, size, p: coarser.map(|c| c.1) })
     }
 
-    /// Whether the disparities lie on a lattice of this step, allowing for a scale or the step's own error.
-    /// `None` where too few words could show it.
-    pub fn on_disparities(&self, step: f64, sensor: &Sensor, scale_px_m: f64) -> Option<bool> {
-        let disparity = |w: usize| Some(scale_px_m / sensor.code.metres(u16::try_from(w).ok()?)?);
+    /// Whether the words lie on a lattice of this step, allowing for a scale or the step's own error. `None`
+    /// where too few words could show it.
+    pub fn on(&self, step: Step, sensor: &Sensor, scale_px_m: f64) -> Option<bool> {
+        let at = |w: usize| {
+            let z = sensor.code.metres(u16::try_from(w).ok()?)?;
+            Some(if step.is_of_depth { z } else { scale_px_m / z })
+        };
+        let step = step.size;
         let fine = |&(w, n): &(usize, f64)| {
-            let d = disparity(w)?;
-            let width = (disparity(w + 1)? - d).abs();
-            (width < COARSE * step).then_some((d, n.sqrt()))
+            let place = at(w)?;
+            let width = (at(w + 1)? - place).abs();
+            (width < COARSE * step).then_some((place, n.sqrt()))
         };
         let words: Vec<(f64, f64)> = self.occurring().iter().filter_map(fine).collect();
         let range = crate::stats::range(words.iter().map(|w| w.0));
@@ -180,23 +184,6 @@ impl RawHistogram {
         let tries =
             (0..=tries as usize).map(|k| Gathered::of(&words, 1.0 / tried(k as f64)).resultant);
         Some(tries.fold(0.0, f64::max) > GATHERED_AT_ALL)
-    }
-
-    /// Whether most depths are multiples of this step. `None` where the words are no finer.
-    pub fn on_depths(&self, step_m: f64, sensor: &Sensor) -> Option<bool> {
-        let words = self.occurring();
-        let depth = |w: usize| sensor.code.metres(u16::try_from(w).ok()?);
-        let (mut multiples, mut all) = (0.0, 0.0);
-        for &(w, n) in &words {
-            let (Some(z), Some(next)) = (depth(w), depth(w + 1)) else { continue };
-            let unit = (next - z).abs();
-            if unit < COARSE * step_m {
-                let off = (z / step_m - (z / step_m).round()).abs() * step_m;
-                multiples += if off <= 0.5 * unit * 1.001 { n } else { 0.0 };
-                all += n;
-            }
-        }
-        (words.len() >= MIN_WORDS && all > 0.0).then_some(multiples > 0.5 * all)
     }
 
     /// Contrast between the counts of neighbouring words, 0 (smooth) to 1 (every other one empty).

@@ -226,13 +226,10 @@ pub(in crate::diagnose) fn contradicted(
     let mut words = RawHistogram::default();
     fields.iter().for_each(|f| words.merge(&f.words));
     let of = |kind: &Kind| {
-        let step = known.parameter(kind.id, kind.parameter)?;
-        let lies = if kind.is_of_depth() {
-            words.on_depths(step, &recording.sensor)?
-        } else {
-            words.on_disparities(step, &recording.sensor, fields[0].scale_px_m)?
-        };
-        (!lies).then(|| kind.finding(step, fields)).filter(|f| f.size.sigma > STEP_SHARE)
+        let size = known.parameter(kind.id, kind.parameter)?;
+        let step = Step { is_of_depth: kind.is_of_depth(), size, p: None };
+        let lies = words.on(step, &recording.sensor, fields[0].scale_px_m)?;
+        (!lies).then(|| kind.finding(size, fields)).filter(|f| f.size.sigma > STEP_SHARE)
     };
     KINDS.iter().filter_map(of).collect()
 }
