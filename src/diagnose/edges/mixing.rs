@@ -93,28 +93,13 @@ pub fn mean_share(
         Some((value - expected, 1.0 / (1.0 / sure + 1.0 / as_sure)))
     };
     let seen: Vec<(f64, f64)> = (0..views.len()).filter_map(of).collect();
-    let alone = by_noise(&seen)?;
-    if twins.is_none() {
-        return Some(alone);
-    }
-    Some((between_runs(&seen)?, alone.1))
+    let (sum, sure) = seen.iter().fold((0.0, 0.0), |(s, w), v| (s + v.0 * v.1, w + v.1));
+    Some((between_views(&seen)?, sum / sure.sqrt()))
 }
 
-/// Mean of (value, information) with the views' scatter where that exceeds the noise, and how well it
-/// explains the views.
-fn by_noise(views: &[(f64, f64)]) -> Option<(ViewMean, f64)> {
-    let n = views.len() as f64;
-    let sure: f64 = views.iter().map(|v| v.1).sum();
-    let value = views.iter().map(|v| v.0 * v.1).sum::<f64>() / sure;
-    let scatter = views.iter().map(|v| v.1 * (v.0 - value).powi(2)).sum::<f64>() / (n - 1.0);
-    let std_error = (scatter.max(1.0) / sure).sqrt();
-    let explained = value * sure.sqrt();
-    (n > 1.0 && sure > 0.0).then_some((ViewMean::new(value, std_error, n), explained))
-}
-
-/// Same for differences between two runs, which differ from view to view without a cause: includes the
-/// scatter between views, so that no view with little noise decides alone.
-fn between_runs(views: &[(f64, f64)]) -> Option<ViewMean> {
+/// Mean of (value, information). Views differ without a cause, so it includes the scatter between them: no
+/// view with little noise decides alone.
+fn between_views(views: &[(f64, f64)]) -> Option<ViewMean> {
     let units: Vec<(f64, f64)> = views.iter().map(|(v, sure)| (*v, 1.0 / sure)).collect();
     let [value, std_error] = common_value(&units)?;
     Some(ViewMean::new(value, std_error, views.len() as f64))
@@ -192,10 +177,10 @@ mod tests {
     fn one_view_of_little_noise_does_not_decide_alone() {
         let others = (0..9).map(|k| (0.03 * f64::from(k - 4) / 4.0, 1e4));
         let views: Vec<(f64, f64)> = others.chain([(0.03, 9e4)]).collect();
-        let share = between_runs(&views).unwrap();
+        let share = between_views(&views).unwrap();
         assert!(share.p_above(0.0) > 0.05, "{share:?}");
         let agreed: Vec<(f64, f64)> = views.iter().map(|(_, sure)| (0.03, *sure)).collect();
-        let share = between_runs(&agreed).unwrap();
+        let share = between_views(&agreed).unwrap();
         assert!(share.p_above(0.0) < 1e-4 && (share.value - 0.03).abs() < 1e-9, "{share:?}");
     }
 }
