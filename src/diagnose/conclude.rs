@@ -60,7 +60,7 @@ impl Case<'_> {
         let scenes = self.scenes();
         self.advise(&mut found, &scenes, outcomes, ends);
         let explained: f64 = found.iter().map(|f| f.share.max(0.0)).sum();
-        let tested = (found.is_empty() && refitted.is_none()).then(|| verdict(&found, outcomes));
+        let unchanged = found.is_empty() && refitted.is_none();
         if found.is_empty() {
             found.extend(far_off(&self.survey, typical_sigma_mm(&self.fields)));
         }
@@ -97,13 +97,11 @@ impl Case<'_> {
             Some(_) => Reference::SimulatedRecording,
             None => Reference::Model,
         };
-        let (after, mut done) = match tested {
-            // Where nothing was found, the model is the extended one and has been tested.
-            Some(tested) => {
-                let verdict = if verdict == Verdict::Inconclusive { verdict } else { tested };
-                (After { verdict, remaining: Vec::new() }, self)
-            }
-            None => self.after(&extended, explained),
+        let (after, mut done) = if unchanged {
+            // The model is the extended one and has been tested.
+            (After { verdict, remaining: Vec::new() }, self)
+        } else {
+            self.after(&extended, explained)
         };
         done.fields.iter_mut().for_each(|f| f.first.clear());
         let diagnosis = Diagnosis {

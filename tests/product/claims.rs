@@ -118,3 +118,31 @@ fn a_model_that_is_far_off_is_no_match() {
     }
     assert_eq!(told(at, "clean", "vignetting", &json!({"growth": 0.0})).0, "match");
 }
+
+/// Two of six views have eight times the noise, and nothing tells them from the others: no term of the extended
+/// model takes the mismatch away.
+#[test]
+fn noise_without_a_law_is_a_mismatch_of_the_extended_model_too() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = folder.path();
+    let views = ["--frames", "2", "--distances", "1,1.5,2", "--tilts", "0,30"];
+    run(at, &[&["simulate", "first", "--shrink", "8"], &views[..]].concat());
+    run(at, &["calibrate", "first", "-o", "calibrated", "-q"]);
+    let text = std::fs::read(at.join("calibrated/model.json")).expect("a model");
+    let mut model: Value = serde_json::from_slice(&text).expect("JSON");
+    for name in ["a", "b"] {
+        let value = &mut model["sigma"]["parameters"][name]["value"];
+        *value = json!(value.as_f64().expect("a number") * 8.0);
+    }
+    std::fs::write(at.join("noisy.json"), model.to_string()).expect("written");
+    run(at, &[&["simulate", "calm", "-m", "calibrated/model.json"], &views[..]].concat());
+    run(at, &[&["simulate", "noisy", "-m", "noisy.json"], &views[..]].concat());
+    for view in ["0000", "0003"] {
+        std::fs::remove_dir_all(at.join("calm").join(view)).expect("removed");
+        std::fs::rename(at.join("noisy").join(view), at.join("calm").join(view)).expect("moved");
+    }
+    let (verdict, _) = told(at, "calm", "vignetting", &json!({"growth": 0.0}));
+    let text = std::fs::read(at.join("told/diagnosis.json")).expect("a diagnosis");
+    let diagnosis: Value = serde_json::from_slice(&text).expect("JSON");
+    assert_eq!([&verdict[..], diagnosis["after"]["verdict"].as_str().unwrap()], ["mismatch"; 2]);
+}
