@@ -27,7 +27,7 @@ fn to_side(views: &[Structure], sign: f64, level: f64) -> Option<TextureFinding>
     if m.value >= MIN_SKEWNESS && p <= level {
         return Some(found(&m, sign, p));
     }
-    let some = some_views(views, of, None).filter(|some| 4.0 * some.p <= level)?;
+    let some = some_views(views, of).filter(|some| 4.0 * some.p <= level)?;
     let m = ViewMean::of(&some.views, of).filter(|m| m.value >= MIN_SKEWNESS)?;
     Some(found(&m, sign, 4.0 * some.p).of_some([some.views.len(), some.of], 4.0 * some.p))
 }

@@ -9,8 +9,7 @@ use crate::stats::{at_least, normal_beyond, student_upper};
 /// Fewer views than this, or than this share of all, are outliers.
 const MIN_VIEWS: usize = 3;
 const MIN_SHARE: f64 = 0.2;
-/// With fewer views below the expected value their scatter is unknown: with two, half of it is chance. The
-/// views' own error then counts as this many views.
+/// With fewer views below the expected value their scatter is unknown: with two, half of it is chance.
 const MIN_BELOW: usize = 3;
 /// Any further view is included where its p-value is below this.
 const CLEAR: f64 = 0.01;
@@ -36,16 +35,6 @@ impl SomeViews {
         (n >= MIN_BELOW && scale > 0.0).then(|| SomeViews::beyond(off, scale, n))?
     }
 
-    /// Tests deviations in units of each view's own error, for too few views below zero to give the scale:
-    /// where most views show the effect.
-    pub fn above_error(off: &[f64]) -> Option<Self> {
-        let below = off.iter().filter(|t| **t < 0.0);
-        let (n, squares) = below.fold((0, 0.0), |(n, sum), t| (n + 1, sum + t * t));
-        let freedom = n + MIN_BELOW;
-        let scale = ((squares + MIN_BELOW as f64) / freedom as f64).sqrt();
-        (n < MIN_BELOW).then(|| SomeViews::beyond(off, scale, freedom))?
-    }
-
     /// Tests deviations with a standard error of `scale`, known with `freedom` degrees of freedom.
     pub fn beyond(off: &[f64], scale: f64, freedom: usize) -> Option<Self> {
         let above = |v: &usize| off[*v] > 0.0;
@@ -68,24 +57,14 @@ pub struct Above {
     pub p: f64,
 }
 
-/// Finds the views whose `value` lies above the others'. Its mean is zero without an effect; `error` is then
-/// its standard error, where known.
-pub fn some_views(
-    views: &[Structure],
-    value: impl Fn(&Structure) -> Option<f64>,
-    error: Option<&dyn Fn(&Structure) -> f64>,
-) -> Option<Above> {
+/// Finds the views whose `value` lies above the others'. Its mean is zero without an effect.
+pub fn some_views(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Above> {
     let measured = |s: &Structure| Some((value(s).filter(|v| v.is_finite())?, s.pixels));
     let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
     let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
     let weight = Weight::of(&values);
     let off: Vec<f64> = values.iter().map(|(x, size)| weight.at(*size).sqrt() * x).collect();
-    let by_error = |error: &dyn Fn(&Structure) -> f64| {
-        let off: Vec<f64> = values.iter().zip(&which).map(|((x, _), s)| x / error(s)).collect();
-        SomeViews::above_error(&off)
-    };
-    let SomeViews { which: these, p } =
-        SomeViews::above(&off).or_else(|| error.and_then(by_error))?;
+    let SomeViews { which: these, p } = SomeViews::above(&off)?;
     let views = these.into_iter().map(|v| which[v].clone()).collect();
     Some(Above { views, of: which.len(), p })
 }
@@ -107,7 +86,7 @@ fn order_statistic(far: f64, k: usize, above: usize, below: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use rand_distr::{ChiSquared, Distribution, StandardNormal};
+    use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
     use crate::rng::{Seed, Stream};
@@ -127,35 +106,6 @@ mod tests {
             // Binomial: 40 +- 6.3; too few views on one side make it fewer.
             assert!((8..60).contains(&seen), "{seen} of 4000 with {n}");
         }
-    }
-
-    /// With their own error, known with three degrees of freedom: in one of two sessions of five views fewer
-    /// than three lie below zero, and one in a hundred of these is found at that level: 100 of 20,000 +- 10.
-    #[test]
-    fn clean_views_are_found_by_their_own_error_as_often_as_the_level_says() {
-        let mut rng = Seed(6).stream("some-views/own-error");
-        let known = ChiSquared::new(MIN_BELOW as f64).unwrap();
-        let mut off = || -> Vec<f64> {
-            let scale = (MIN_BELOW as f64 / known.sample(&mut rng)).sqrt();
-            views(5, 0, 0.0, &mut rng).into_iter().map(|x| 100.0 * scale * x).collect()
-        };
-        let clean = |_| SomeViews::above_error(&off()).map_or(1.0, |s| s.p);
-        let seen = (0..20_000).map(clean).filter(|p| *p < 0.01).count();
-        assert!((60..140).contains(&seen), "{seen} of 20000");
-    }
-
-    /// Nine of twelve views show the effect; in most sessions fewer than three of the others lie below zero.
-    #[test]
-    fn nine_of_twelve_views_are_told_by_their_own_error() {
-        let mut rng = Seed(5).stream("some-views/most");
-        let mut off = |tall| -> Vec<f64> {
-            views(12, tall, 15.0, &mut rng).into_iter().map(|x| 100.0 * x).collect()
-        };
-        let told = (0..200).filter_map(|_| SomeViews::above_error(&off(9)));
-        let told = told.filter(|s| s.p < 1e-4 && s.which.len() == 9).count();
-        // In 7 of 8 sessions none, one or two of the three others lie below zero; in one in ten of these a
-        // tenth view has a p-value below 0.01, or the scale is wide.
-        assert!((120..=175).contains(&told), "{told} of 200");
     }
 
     #[test]
