@@ -3,7 +3,6 @@
 use statrs::distribution::{Chi, Continuous};
 
 use super::structure::Structure;
-use super::view_mean::Weight;
 use crate::stats::{at_least, normal_beyond, student_upper};
 
 /// Fewer views than this, or than this share of all, are outliers.
@@ -55,18 +54,6 @@ pub struct Above {
     pub views: Vec<Structure>,
     pub of: usize,
     pub p: f64,
-}
-
-/// Finds the views whose `value` lies above the others'. Its mean is zero without an effect.
-pub fn some_views(views: &[Structure], value: impl Fn(&Structure) -> Option<f64>) -> Option<Above> {
-    let measured = |s: &Structure| Some((value(s).filter(|v| v.is_finite())?, s.pixels));
-    let which: Vec<&Structure> = views.iter().filter(|s| measured(s).is_some()).collect();
-    let values: Vec<(f64, f64)> = which.iter().filter_map(|s| measured(s)).collect();
-    let weight = Weight::of(&values);
-    let off: Vec<f64> = values.iter().map(|(x, size)| weight.at(*size).sqrt() * x).collect();
-    let SomeViews { which: these, p } = SomeViews::above(&off)?;
-    let views = these.into_iter().map(|v| which[v].clone()).collect();
-    Some(Above { views, of: which.len(), p })
 }
 
 /// P-value of the `k`-th largest of `above` half-normal values at `far`, in units of the root mean square of
