@@ -13,7 +13,6 @@ pub mod moments;
 pub mod outliers;
 pub mod pairs;
 pub mod scatter;
-pub mod some_views;
 pub mod still;
 pub mod structure;
 pub mod structures;
