@@ -86,29 +86,6 @@ fn rows_that_err_alike_are_worth_less() {
     assert_eq!(none.excess_of_rows(&Correlation::white()), [1.0; 2]);
 }
 
-/// Means over six views whose pixels share an error, simulated 5,000 times: they scatter as stated to
-/// 4 %, twice the standard error of such a scatter.
-#[test]
-fn views_with_a_pattern_in_common_are_worth_fewer() {
-    const VIEWS: usize = 6;
-    const FRAMES: usize = 4;
-    const PATTERN_PX: f64 = 0.4;
-    let mut rng = Seed(5).stream("structure/pattern");
-    let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
-    let (mut together, mut each) = (0.0, 0.0);
-    for _ in 0..5000 {
-        let pattern = PATTERN_PX * draw();
-        let views: Vec<f64> =
-            (0..VIEWS).map(|_| pattern + draw() / (FRAMES as f64).sqrt()).collect();
-        together += views.iter().sum::<f64>().powi(2) / VIEWS as f64;
-        each += views.iter().map(|x| x * x).sum::<f64>() / VIEWS as f64;
-    }
-    let s = Structure { variance_px2: 1.0 + PATTERN_PX.powi(2), ..Structure::default() };
-    let said =
-        s.excess_of_pattern(PATTERN_PX.powi(2), FRAMES as f64, VIEWS as f64, &Correlation::white());
-    assert!((said / (together / each) - 1.0).abs() < 0.04, "{said}, {}", together / each);
-}
-
 /// A target of the same noise elsewhere in the picture: images of it are cut to it.
 #[test]
 fn a_target_has_the_same_structure_wherever_it_is_seen() {

@@ -164,7 +164,7 @@ fn mean_size(counts: &TailCounts) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::noise::tests::{drawn, gaussian_in_depth, normal};
+    use crate::diagnose::noise::tests::{drawn, gaussian_in_depth, normal, parameter};
     use rand_distr::{Distribution, StudentT};
 
     const VIEWS: usize = 14;
@@ -244,7 +244,10 @@ mod tests {
             views.iter_mut().for_each(|v| v.tails.beyond = GAUSSIAN_TAIL * v.tails.n);
             views
         };
-        assert!(told(&in_depth(0.0), false, false).is_some());
+        // Its excess in the disparity is 72 s^2 = .088, of which .013 lie beyond the cut.
+        let bent = told(&in_depth(0.0), false, false).expect("heavy in the disparity");
+        let [value, error] = parameter(&bent, EXCESS);
+        assert!((value - 0.075).abs() < 4.0 * error, "{value} +- {error}");
         assert!(told(&in_depth(S), false, false).is_none(), "Gaussian in the depth");
         assert!(told(&heavy(0.0), true, false).is_none(), "of a noise that is uneven anyway");
         assert!(told(&heavy(0.0), false, true).is_none(), "of a simulation");
