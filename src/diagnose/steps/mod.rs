@@ -151,7 +151,7 @@ pub(in crate::diagnose) fn forget_windows(
         let sigma = f.middle_sigma_px().map_or(0.0, f64::from);
         if step.px(f.scale_px_m, f.plane.depth(0.0, 0.0)) > COARSE_SIGMAS * sigma {
             (s.window_px, s.neighbour_correlation, s.correlation_profile) = (None, None, None);
-            (s.row_px2, s.column_px2) = (None, None);
+            (s.near_sum, s.row_px2, s.column_px2) = (None, None, None);
             // Without the window's size the error of a frame's size is unknown.
             s.frame_pixels = 0.0;
         }
