@@ -5,6 +5,7 @@ use statrs::statistics::Statistics;
 
 use super::field::Field;
 use super::known::KnownTerms;
+use super::layers::second_half;
 use crate::diagnose::diagnosis::{Finding, Size};
 use crate::diagnose::finding::other_findings::named;
 use crate::diagnose::finding::parameters::estimate;
@@ -39,8 +40,10 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
     };
     let mm = middle(&|f| 1e3 * rms_px / f.plane.q.z.powi(2) / f.scale_px_m);
     let sigma = middle(&|f| f.middle_sigma_px().map_or(0.0, |s| rms_px / f64::from(s)));
-    let of_half =
-        |half: usize| fields.iter().skip(half).step_by(2).any(|f| f.column_steps.is_some());
+    let second = second_half(fields);
+    let of_half = |half: bool| {
+        fields.iter().zip(&second).any(|(f, s)| *s == half && f.column_steps.is_some())
+    };
     let mut parameters = Map::new();
     let amplitude_px = 0.5 * step_px;
     parameters.insert("amplitude_px".into(), estimate(amplitude_px, STEP_ERROR * amplitude_px));
@@ -63,7 +66,7 @@ pub(in crate::diagnose) fn column_steps(fields: &[Field], known: &KnownTerms) ->
         parameters,
         size: Size { mm, sigma },
         p_adjusted: Some((clearest * fields.len() as f64).min(1.0)),
-        replicated: Some(of_half(0) && of_half(1)),
+        replicated: Some(of_half(false) && of_half(true)),
         ..plain
     })
 }

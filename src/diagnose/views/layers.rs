@@ -24,6 +24,12 @@ use crate::sensors::SensorKind;
 use crate::stats::Correlation;
 use crate::terms::{Extent, PixelContext, Term};
 
+/// Whether each view is in the second half, by its target's distance and tilt.
+pub fn second_half(fields: &[Field]) -> Vec<bool> {
+    let pose = |f: &Field| (f.plane.distance(), f.plane.theta());
+    halves(&fields.iter().map(pose).collect::<Vec<_>>())
+}
+
 /// The tiles of all views, with each view's weight.
 pub struct Survey {
     pub views: Vec<SurveyedView>,
@@ -56,12 +62,10 @@ impl Survey {
     /// `step` is that of the stored words.
     pub fn of(fields: &[Field], bench: &Workbench<'_>, step: Option<Step>) -> Self {
         let camera = &bench.sensor.camera;
-        let poses: Vec<(f64, f64)> =
-            fields.iter().map(|f| (f.plane.distance(), f.plane.theta())).collect();
         let mut views: Vec<SurveyedView> = fields
             .par_iter()
             .zip(inflations(fields, &[]))
-            .zip(halves(&poses))
+            .zip(second_half(fields))
             .map(|((f, (inflation, correlation)), in_second_half)| {
                 let (places, tiles) = tiles(f, camera, &bench.rays);
                 SurveyedView {
