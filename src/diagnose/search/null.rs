@@ -17,19 +17,13 @@ pub struct Null {
     /// Eigenvectors of the summed A.
     axes: DMatrix<f64>,
     /// For each eigenvector, the information of each view and the total.
-    vectors: Vec<(Vec<Information>, f64)>,
+    vectors: Vec<(Vec<f64>, f64)>,
     prior: f64,
     /// Dispersion of the views' fits over their noise, at least 1: about the common fit, or about zero
     /// where only a few views have the term.
     pub dispersion: f64,
     /// Dispersion about the common fit.
     pub about_fit: f64,
-}
-
-/// Information of a view on an eigenvector, and its root.
-struct Information {
-    value: f64,
-    root: f64,
 }
 
 impl Null {
@@ -48,12 +42,19 @@ impl Null {
         };
         let by_view: Vec<Vec<f64>> = alone.iter().map(|e| information(&e.a)).collect();
         let total: Vec<f64> = (0..k).map(|j| by_view.iter().map(|a| a[j]).sum()).collect();
-        let about_fit = dispersion(alone, &by_view, &total, &u, prior);
-        let dispersion = about_fit.min(usual_square(&by_view, &total, &u, alone));
-        let of_vector = |(j, &total): (usize, &f64)| {
-            let values = by_view.iter().map(|a| a[j]);
-            (values.map(|value| Information { value, root: value.sqrt() }).collect(), total)
+        let known = informed(&by_view, &total);
+        // Squared score along an eigenvector, relative to noise.
+        let square = |&(j, v): &(usize, usize), score: &DVector<f64>| {
+            u.column(j).dot(score).powi(2) / by_view[v][j]
         };
+        let about_fit = left_scores(alone, prior).map_or(1.0, |left| {
+            let squares = known.iter().map(|at| square(at, &left[at.1])).sum();
+            dispersion(squares, known.iter().map(|&(j, v)| 1.0 - by_view[v][j] / total[j]).sum())
+        });
+        let usual = usual_square(known.iter().map(|at| square(at, &alone[at.1].b)).collect());
+        let dispersion = about_fit.min(usual);
+        let of_vector =
+            |(j, &total): (usize, &f64)| (by_view.iter().map(|a| a[j]).collect(), total);
         let vectors = total.iter().enumerate().map(of_vector).collect();
         Some(Null { axes: u, vectors, prior, dispersion, about_fit })
     }
@@ -95,7 +96,7 @@ impl Null {
         let mut gain = 0.0;
         for (views, total) in &self.vectors {
             b.clear();
-            b.extend(views.iter().map(|a| a.root * normal()));
+            b.extend(views.iter().map(|a| a.sqrt() * normal()));
             gain += self.gain_along(views, *total, &b);
         }
         gain
@@ -111,7 +112,7 @@ impl Null {
         let turned: Vec<DMatrix<f64>> = scores.iter().map(|b| self.axes.tr_mul(b)).collect();
         let recordings = turned.first().map_or(0, DMatrix::ncols);
         let of = |r: usize| {
-            let along = |(j, (views, total)): (usize, &(Vec<Information>, f64))| {
+            let along = |(j, (views, total)): (usize, &(Vec<f64>, f64))| {
                 let b: Vec<f64> = turned.iter().map(|b| b[(j, r)]).collect();
                 self.gain_along(views, *total, &b)
             };
@@ -121,11 +122,11 @@ impl Null {
     }
 
     /// Gain along one eigenvector, each view predicted from the others' scores `b`.
-    fn gain_along(&self, views: &[Information], total: f64, b: &[f64]) -> f64 {
+    fn gain_along(&self, views: &[f64], total: f64, b: &[f64]) -> f64 {
         let sum: f64 = b.iter().sum();
-        let of = |(b, a): (&f64, &Information)| {
-            let beta = (sum - b) / (total - a.value + self.prior);
-            beta * (b - 0.5 * beta * a.value)
+        let of = |(b, a): (&f64, &f64)| {
+            let beta = (sum - b) / (total - a + self.prior);
+            beta * (b - 0.5 * beta * a)
         };
         b.iter().zip(views).map(of).sum()
     }
@@ -147,49 +148,37 @@ fn gaussian(nats: f64, freedom: f64) -> f64 {
     0.5 * freedom * (2.0 * nats / freedom).exp_m1()
 }
 
-/// Dispersion of the views' scores about the common fit, relative to noise.
-fn dispersion(
-    alone: &[Evidence],
-    by_view: &[Vec<f64>],
-    total: &[f64],
-    u: &DMatrix<f64>,
-    prior: f64,
-) -> f64 {
+/// Eigenvectors and views, by index, with enough information on them: almost none would divide by almost zero.
+fn informed(by_view: &[Vec<f64>], total: &[f64]) -> Vec<(usize, usize)> {
     let most = total.iter().copied().fold(0.0, f64::max);
-    let whole = Evidence::sum(u.nrows(), prior, alone);
-    let Some(factor) = whole.a.cholesky() else { return 1.0 };
-    let beta = factor.solve(&whole.b);
-    // Scores left by the common fit.
-    let left: Vec<DVector<f64>> = alone.iter().map(|e| &e.b - &e.a * &beta).collect();
-    let (mut sum, mut n) = (0.0, 0.0);
-    for (j, &total) in total.iter().enumerate() {
-        if total < 1e-6 * most {
-            continue;
-        }
-        for (left, a) in left.iter().zip(by_view) {
-            // A view with almost no information would divide by almost zero.
-            if a[j] > 1e-3 * total {
-                sum += u.column(j).dot(left).powi(2) / a[j];
-                n += 1.0 - a[j] / total;
-            }
-        }
-    }
-    if n < 1.0 {
+    let vectors = total.iter().enumerate().filter(|(_, total)| **total >= 1e-6 * most);
+    let views = |(j, total): (usize, &f64)| {
+        let least = 1e-3 * total;
+        (0..by_view.len()).filter(move |&v| by_view[v][j] > least).map(move |v| (j, v))
+    };
+    vectors.flat_map(views).collect()
+}
+
+/// Scores that the common fit leaves of each view.
+fn left_scores(alone: &[Evidence], prior: f64) -> Option<Vec<DVector<f64>>> {
+    let whole = Evidence::sum(alone[0].b.len(), prior, alone);
+    let beta = whole.a.cholesky()?.solve(&whole.b);
+    Some(alone.iter().map(|e| &e.b - &e.a * &beta).collect())
+}
+
+/// Dispersion of the views' scores about the common fit, from the sum of their `squares` relative to noise,
+/// with so many degrees of freedom.
+fn dispersion(squares: f64, freedom: f64) -> f64 {
+    if freedom < 1.0 {
         return 1.0;
     }
-    // Less one standard error of the estimate, sqrt(2 / n).
-    (sum / n - f64::sqrt(2.0 / n)).max(1.0)
+    // Less one standard error of the estimate.
+    (squares / freedom - (2.0 / freedom).sqrt()).max(1.0)
 }
 
 /// Median of the views' squared scores, relative to noise: near 1 where most views do not have the
 /// term, whatever the others show.
-fn usual_square(by_view: &[Vec<f64>], total: &[f64], u: &DMatrix<f64>, alone: &[Evidence]) -> f64 {
-    let most = total.iter().copied().fold(0.0, f64::max);
-    let mut squares = Vec::new();
-    for (j, &total) in total.iter().enumerate().filter(|(_, t)| **t >= 1e-6 * most) {
-        let seen = alone.iter().zip(by_view).filter(|(_, a)| a[j] > 1e-3 * total);
-        squares.extend(seen.map(|(e, a)| u.column(j).dot(&e.b).powi(2) / a[j]));
-    }
+fn usual_square(mut squares: Vec<f64>) -> f64 {
     if squares.is_empty() {
         return 1.0;
     }
