@@ -25,7 +25,7 @@ use crate::terms::Gauge;
 use columns::Columns;
 use error::clustered;
 use fit::{Joint, Reduced};
-use terms::{Settled, System, is_rough, total};
+use terms::{Settled, System, total};
 
 /// Refits the terms of a finished search jointly, with the smooth remainder. `fine` are the views'
 /// means in small patches. `inflation` is what each view's weights were divided by; it is replaced by
@@ -41,7 +41,7 @@ pub fn refit(
     if found.chosen.is_empty() {
         return found;
     }
-    let rough = found.chosen.iter().any(|c| is_rough(&c.candidate));
+    let rough = found.chosen.iter().any(|c| c.candidate.is_rough());
     let common = median(inflation);
     let data: Vec<ViewData> = fine
         .par_iter()

@@ -6,7 +6,6 @@ use super::fit::{Joint, Reduced, SMOOTHNESS};
 use crate::diagnose::search::candidate::Candidate;
 use crate::diagnose::search::choose::{behind, over_error};
 use crate::diagnose::search::outcome::Chosen;
-use crate::diagnose::views::samples::COARSE_PX;
 use crate::stats::student_upper;
 use crate::terms::{Axis, Basis, Coordinate, Statistic, Term};
 
@@ -128,13 +127,13 @@ impl Joint<'_> {
             let c = &chosen[t].candidate;
             let named = alone > RADIAL_NAME_ADEQUATE * total(&s.scores);
             let waves = c.basis.period().is_some();
-            waves || !(is_rough(c) || (named && is_radial_name(c)))
+            waves || !(c.is_rough() || (named && is_radial_name(c)))
         };
         let needless = |s: &Settled, t: usize, lost: f64, scores: &[f64]| {
             let of_target = !is_of_sensor(&chosen[t].candidate);
             let share = match of_target {
                 true => MAPS_SHARE,
-                false if is_rough(&chosen[t].candidate) => 0.0,
+                false if chosen[t].candidate.is_rough() => 0.0,
                 false => TERM_SHARE,
             };
             let clear = behind(&s.scores, scores) > TERM_CLEARLY;
@@ -274,25 +273,6 @@ pub fn is_smooth_and_nameless(c: &Candidate) -> bool {
 
 fn is_radial_name(c: &Candidate) -> bool {
     c.family.is_some() && c.basis.axis() == Axis::Radius
-}
-
-/// Number of nodes from which a curve over columns or rows is too fine for a smooth map.
-const FINE_LINES: usize = 30;
-/// Smallest node spacing that larger patches resolve, in patches.
-const PATCHES_A_NODE: f64 = 2.0;
-
-/// Whether it is too rough for a smooth map to replace it, or for larger patches to show it.
-pub fn is_rough(c: &Candidate) -> bool {
-    let changes_within_a_patch = match c.basis {
-        Basis::Curve { over: Coordinate::Column | Coordinate::Row, low, high, nodes, .. } => {
-            nodes == 2
-                || nodes >= FINE_LINES
-                || high - low < PATCHES_A_NODE * COARSE_PX * nodes as f64
-        }
-        Basis::Curve { .. } => c.basis.alone().is_some(),
-        _ => false,
-    };
-    c.basis.is_fine() || changes_within_a_patch || c.basis.period().is_some()
 }
 
 fn is_of_sensor(c: &Candidate) -> bool {

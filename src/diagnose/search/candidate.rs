@@ -1,5 +1,6 @@
 //! Candidates for a missing term: a shape with or without the name of its cause.
 
+use crate::diagnose::views::samples::COARSE_PX;
 use crate::effects::{self, Bounds, Effect, Flat, USUAL_PX};
 use crate::terms::{Axis, Basis, Coordinate, Modulation, Statistic};
 
@@ -15,6 +16,11 @@ pub struct Candidate {
 
 /// Family of the sigma model's own parameters: nothing is missing, they are off.
 pub const RECALIBRATE: &str = "recalibrate";
+
+/// Number of nodes from which a curve over columns or rows is too fine for a smooth map.
+const FINE_LINES: usize = 30;
+/// Smallest node spacing that larger patches resolve, in patches.
+const PATCHES_A_NODE: f64 = 2.0;
 
 impl Candidate {
     pub fn named(family: &'static str, basis: Basis) -> Self {
@@ -54,6 +60,22 @@ impl Candidate {
             Basis::Curve { over: axis, .. } | Basis::Ring { over: axis, .. } => over(axis),
             _ => self.basis.axis() == Axis::DisparityPhase,
         }
+    }
+
+    /// Whether it is too rough for a smooth map to replace it, or for larger patches to show it.
+    pub fn is_rough(&self) -> bool {
+        let changes_within_a_patch = match self.basis {
+            Basis::Curve {
+                over: Coordinate::Column | Coordinate::Row, low, high, nodes, ..
+            } => {
+                nodes == 2
+                    || nodes >= FINE_LINES
+                    || high - low < PATCHES_A_NODE * COARSE_PX * nodes as f64
+            }
+            Basis::Curve { .. } => self.basis.alone().is_some(),
+            _ => false,
+        };
+        self.basis.is_fine() || changes_within_a_patch || self.basis.period().is_some()
     }
 
     /// The effect that it is the shape of.

@@ -93,9 +93,8 @@ impl Trial<'_> {
             self.beside.iter().any(same)
         };
         let open = || nest.iter().copied().filter(|&k| !taken(&candidates[k]));
-        let Some(widest) = open().next() else { return Vec::new() };
-        let of_widest = |v: &Prepared<'_>| v.evidence(&candidates[widest].basis);
-        let mut evidence: Vec<Evidence> = self.views.iter().map(of_widest).collect();
+        let Some(widest) = open().next().map(|k| &candidates[k].basis) else { return Vec::new() };
+        let mut evidence: Vec<Evidence> = self.views.iter().map(|v| v.evidence(widest)).collect();
         let before = if self.is_pinned {
             None
         } else {
