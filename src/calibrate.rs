@@ -12,7 +12,7 @@ use crate::Progress;
 use crate::error::{Error, Result};
 use crate::io::{hex, sha256_hex};
 use crate::measure::{
-    MeasureOptions, Planes, ReferenceDistance, SigmaKind, SigmaTable, ViewMeasurement, Workbench,
+    MeasureOptions, ReferenceDistance, SigmaKind, SigmaTable, ViewMeasurement, Workbench,
     measure_view, ranges_remark, without_copies,
 };
 use crate::model::{
@@ -210,15 +210,10 @@ fn describe(options: &CalibrateOptions, form: Form, compared: bool) -> Map<Strin
         None if compared => "held-out distances",
         None => "default: no form can be judged at distances left out",
     };
-    let planes = match options.measure.planes {
-        Planes::PerView => "view",
-        Planes::PerFrame => "frame",
-    };
     let value = json!({
         "form": form.id(),
         "form_chosen_by": chosen_by,
         "sigma": options.kind.description(),
-        "planes": planes,
         "ransac_threshold_m": options.measure.ransac_threshold_m,
         "ransac_iterations": options.measure.ransac_iterations,
     });

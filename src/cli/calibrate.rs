@@ -4,7 +4,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use kinoise::calibrate::{Measurements, measure, model_of};
 use kinoise::io::{OutputFolder, open};
-use kinoise::measure::{MeasureOptions, Planes, read_table, write_measurements};
+use kinoise::measure::{MeasureOptions, read_table, write_measurements};
 use kinoise::report::{CalibrationPage, Overlay, calibration_page, figure2, sigma_map};
 use kinoise::units::counted;
 use kinoise::{CalibrateOptions, Calibration, Form, Recording, SigmaKind, model_of_table, stats};
@@ -46,12 +46,6 @@ struct Measuring {
         ("paper", "Across the plane, by the paper's method", SigmaKind::Paper),
     ]))]
     sigma: SigmaKind,
-    /// What a plane is fitted to
-    #[arg(long, default_value = "view", value_parser = one_of([
-        ("view", "The whole view, which stands still", Planes::PerView),
-        ("frame", "Every frame of it", Planes::PerFrame),
-    ]))]
-    planes: Planes,
     /// The paper's RANSAC threshold in m [default: 3 robust standard deviations of the view]
     #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = between(1e-6, 1.0, "m"))]
     ransac_threshold: Option<f64>,
@@ -94,9 +88,8 @@ impl Fitting {
 
 impl Arguments {
     fn options(&self, global: &Global) -> anyhow::Result<CalibrateOptions> {
-        let Measuring { sigma, planes, ransac_threshold } = self.measuring;
+        let Measuring { sigma, ransac_threshold } = self.measuring;
         let measure = MeasureOptions {
-            planes,
             ransac_threshold_m: ransac_threshold,
             seed: global.seed(),
             ..MeasureOptions::default()
@@ -113,10 +106,9 @@ impl Arguments {
 
     /// Refuses the options of the measurement: a table has no frames to measure.
     fn refuse_measuring(&self) -> anyhow::Result<()> {
-        let Measuring { sigma, planes, ransac_threshold } = self.measuring;
+        let Measuring { sigma, ransac_threshold } = self.measuring;
         let options = [
             ("--sigma", sigma != SigmaKind::Spatial),
-            ("--planes", planes != Planes::PerView),
             ("--ransac-threshold", ransac_threshold.is_some()),
             ("--intrinsics and the like", self.input != Input::default()),
         ];

@@ -139,7 +139,6 @@ pub(super) struct Context {
     pub temporal_rho: f64,
     /// Pixels of the whole view: all cells share the plane's three parameters.
     pub view_pixels: f64,
-    pub per_frame_planes: bool,
 }
 
 const PLANE_PARAMETERS: f64 = 3.0;
@@ -249,9 +248,7 @@ impl Context {
     /// Share of one frame's variance that the plane fit absorbed.
     fn absorbed(&self, frozen: f64, moving_frames: f64) -> f64 {
         let per_plane = PLANE_PARAMETERS * self.correlation_sum / self.view_pixels.max(1.0);
-        let share =
-            if self.per_frame_planes { 1.0 } else { frozen + (1.0 - frozen) / moving_frames };
-        (per_plane * share).min(MAX_ABSORBED)
+        (per_plane * (frozen + (1.0 - frozen) / moving_frames)).min(MAX_ABSORBED)
     }
 }
 
@@ -279,7 +276,6 @@ mod tests {
             correlation_squares: 1.0,
             temporal_rho: 0.0,
             view_pixels,
-            per_frame_planes: false,
         }
     }
 

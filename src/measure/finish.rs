@@ -6,7 +6,7 @@ use super::cells::{Cell, Context, Sums};
 use super::doubtful::{Bin, doubts};
 use super::grouping::CUT_SIGMAS;
 use super::scan::Scan;
-use super::{Planes, ResidualPicture, ViewMeasurement};
+use super::{ResidualPicture, ViewMeasurement};
 use crate::frame::Frame;
 use crate::plane::{Effort, Plane, Target, fit_affine_robust};
 use crate::residual::perpendicular_per_axial;
@@ -17,19 +17,11 @@ impl Scan<'_> {
     /// notes). `None` when nothing was measured.
     pub fn finish(self, target: &Target, first: &Frame) -> Option<ViewMeasurement> {
         let frames = self.lagged.frames;
-        let plane = match self.bench.options.planes {
-            Planes::PerView => self.refit(target),
-            Planes::PerFrame => Plane::new(self.own_planes / frames as f64),
-        };
+        let plane = self.refit(target);
         let shift = self.shift_to(&plane);
         let cells = 0..self.cut.len();
         let mut sums: Vec<Sums> = cells.map(|cell| self.sums_of(cell, &plane, &shift)).collect();
-        // About its own plane: the tremble of a frame's tilt is no correlation between pixels.
-        let own = match self.bench.options.planes {
-            Planes::PerView => None,
-            Planes::PerFrame => self.own_plane(first, &vec![0.0; self.cut.len()]),
-        };
-        let correlation = self.correlation(first, &own.unwrap_or(plane), &sums);
+        let correlation = self.correlation(first, &plane, &sums);
         let temporal_correlation = self.lagged.correlation();
         let context = self.context(&correlation, temporal_correlation);
         sums.iter_mut().for_each(|s| s.shared = context.shared_by_a_frame(s));
@@ -111,9 +103,6 @@ impl Scan<'_> {
 
     /// Change of each pixel's expected depth by the refit, m.
     fn shift_to(&self, plane: &Plane) -> Vec<f64> {
-        if self.bench.options.planes == Planes::PerFrame {
-            return vec![0.0; self.pixels.len()];
-        }
         let rays = &self.bench.rays;
         let rise = |(&i, &old): (&u32, &f32)| plane.depth_at(rays, i as usize) - f64::from(old);
         self.pixels.iter().zip(&self.expected).map(rise).collect()
@@ -163,7 +152,6 @@ impl Scan<'_> {
             correlation_squares: correlation.sum_of_squares,
             temporal_rho: rho,
             view_pixels: self.pixels.len() as f64,
-            per_frame_planes: self.bench.options.planes == Planes::PerFrame,
         }
     }
 

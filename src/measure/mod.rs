@@ -31,19 +31,8 @@ use crate::rng::Seed;
 use crate::stats::{Budget, Correlation};
 use crate::view::Sensor;
 
-/// One plane for the view, or a new one for every frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Planes {
-    /// For a static scene: errors common to all frames stay in sigma.
-    #[default]
-    PerView,
-    /// For a trembling target: sigma excludes its motion as a whole.
-    PerFrame,
-}
-
 #[derive(Debug, Clone, Copy)]
 pub struct MeasureOptions {
-    pub planes: Planes,
     /// The paper's RANSAC threshold, m; by default three robust standard deviations of the view.
     pub ransac_threshold_m: Option<f64>,
     /// Largest number of hypotheses that the paper's RANSAC tries.
@@ -53,12 +42,7 @@ pub struct MeasureOptions {
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions {
-            planes: Planes::default(),
-            ransac_threshold_m: None,
-            ransac_iterations: 500,
-            seed: Seed(0),
-        }
+        MeasureOptions { ransac_threshold_m: None, ransac_iterations: 500, seed: Seed(0) }
     }
 }
 

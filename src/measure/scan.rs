@@ -1,10 +1,8 @@
 //! The streaming pass: sums the residuals of the target's pixels, frame by frame.
 
-use nalgebra::{Matrix3, Vector3};
-
+use super::Workbench;
 use super::follow::{Follow, MAJORITY, NO_SHIFT, centre};
 use super::grouping::{CUT_SIGMAS, by_cell, settled_scale, words_a_step};
-use super::{Planes, Workbench};
 use crate::frame::Frame;
 use crate::plane::{Plane, Target};
 use crate::residual::perpendicular_per_axial;
@@ -36,8 +34,6 @@ pub(super) struct Scan<'a> {
     pub(super) dropouts: Vec<usize>,
     pub(super) beyond: Vec<usize>,
     pub(super) lagged: Lagged,
-    /// Sum of the frames' own planes when they are fitted one by one.
-    pub(super) own_planes: Vector3<f64>,
 }
 
 /// Sums of a cell's residuals over the frames, for the variance between frames.
@@ -74,7 +70,6 @@ impl<'a> Scan<'a> {
             dropouts: vec![0; cells],
             beyond: vec![0; cells],
             lagged: Lagged::default(),
-            own_planes: Vector3::zeros(),
         };
         scan.find_cuts(held);
         scan
@@ -169,32 +164,20 @@ impl<'a> Scan<'a> {
     /// Adds a frame, unless most of the target is elsewhere than in the first frames. Returns whether it did.
     pub fn add(&mut self, frame: &Frame) -> bool {
         let Some(shifts) = self.shifts(frame) else { return false };
-        match self.bench.options.planes {
-            Planes::PerView => self.accumulate(frame, None, &shifts),
-            Planes::PerFrame => {
-                let own = self.own_plane(frame, &shifts).unwrap_or(self.plane);
-                self.own_planes += own.q;
-                self.accumulate(frame, Some(own), &vec![0.0; shifts.len()]);
-            }
-        }
+        self.accumulate(frame, &shifts);
         self.lagged.frames += 1;
         true
     }
 
-    fn accumulate(&mut self, frame: &Frame, own: Option<Plane>, shifts: &[f32]) {
+    fn accumulate(&mut self, frame: &Frame, shifts: &[f32]) {
         let follow = self.lagged.frames < HELD_FRAMES;
         let mut residuals = if follow { vec![f32::NAN; self.pixels.len()] } else { Vec::new() };
         for (cell, &shift) in shifts.iter().enumerate() {
             let cut = self.cut[cell];
             let (mut n, mut total) = (0u32, 0f64);
             for k in self.cell_range(cell) {
-                let i = self.pixels[k] as usize;
-                let z = self.bench.table.metres(frame.raw[i]);
-                let expected = match own {
-                    None => self.expected[k],
-                    Some(plane) => plane.depth_at(&self.bench.rays, i) as f32,
-                };
-                let e = z - expected;
+                let z = self.bench.table.metres(frame.raw[self.pixels[k] as usize]);
+                let e = z - self.expected[k];
                 if (e - shift).abs() < cut {
                     self.count[k] += 1;
                     let e64 = f64::from(e);
@@ -221,26 +204,6 @@ impl<'a> Scan<'a> {
         if follow {
             self.lagged.follow(residuals);
         }
-    }
-
-    /// Plane of this frame alone: least squares in inverse depth on the residuals within the cut.
-    pub(super) fn own_plane(&self, frame: &Frame, shifts: &[f32]) -> Option<Plane> {
-        let mut normal = Matrix3::zeros();
-        let mut right = Vector3::zeros();
-        for (cell, &shift) in shifts.iter().enumerate() {
-            for k in self.cell_range(cell) {
-                let e = self.residual(frame, k);
-                if (e - shift).abs() < self.cut[cell] {
-                    let (x, y) = self.bench.rays.at(self.pixels[k] as usize);
-                    let ray = Vector3::new(x, y, 1.0);
-                    let z = f64::from(self.expected[k]);
-                    normal += ray * ray.transpose();
-                    right += ray * (1.0 / (z + f64::from(e)) - 1.0 / z);
-                }
-            }
-        }
-        let shift = normal.cholesky()?.solve(&right);
-        Some(Plane::new(self.plane.q + shift)).filter(Plane::is_finite)
     }
 }
 

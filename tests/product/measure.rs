@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use kinoise::io::{Assumed, encode_png16, open, write_recording_file};
-use kinoise::measure::{MeasureOptions, Planes, ViewMeasurement, Workbench, measure_view};
+use kinoise::measure::{MeasureOptions, ViewMeasurement, Workbench, measure_view};
 use kinoise::simulate::kinect_v1;
 use kinoise::{Frame, Plane, Seed, Sensor};
 use rand::Rng;
@@ -98,14 +98,8 @@ fn record(root: &Path, plane: &Plane, noise: &Noise, frames: usize, seed: u64) {
     std::fs::write(root.join("0000/depth.txt"), list).unwrap();
 }
 
-fn measured(
-    plane: &Plane,
-    noise: &Noise,
-    frames: usize,
-    seed: u64,
-    planes: Planes,
-) -> ViewMeasurement {
-    try_measured(plane, noise, frames, seed, planes).unwrap()
+fn measured(plane: &Plane, noise: &Noise, frames: usize, seed: u64) -> ViewMeasurement {
+    try_measured(plane, noise, frames, seed).unwrap()
 }
 
 fn try_measured(
@@ -113,13 +107,11 @@ fn try_measured(
     noise: &Noise,
     frames: usize,
     seed: u64,
-    planes: Planes,
 ) -> kinoise::error::Result<ViewMeasurement> {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), plane, noise, frames, seed);
     let recording = open(folder.path(), &Assumed::default()).unwrap();
-    let bench =
-        Workbench::new(&recording.sensor, MeasureOptions { planes, ..MeasureOptions::default() });
+    let bench = Workbench::new(&recording.sensor, MeasureOptions::default());
     measure_view(&recording.views[0], &bench)
 }
 
@@ -137,7 +129,7 @@ fn near(value: f64, truth: f64, share: f64, what: &str) {
 fn frozen_and_temporal_noise_are_told_apart() {
     for (temporal, frozen) in [(0.004, 0.0), (0.003, 0.004), (0.001, 0.005)] {
         let noise = Noise { temporal, frozen, ..Noise::default() };
-        let m = measured(&frontal(), &noise, 12, 7, Planes::PerView);
+        let m = measured(&frontal(), &noise, 12, 7);
         let total = f64::hypot(temporal, frozen);
         near(m.whole.spread.spatial_m, total, 0.025, "spatial");
         near(m.whole.spread.total_m, total, 0.025, "total");
@@ -154,7 +146,7 @@ fn steps_coarser_than_the_file_are_no_gross_errors() {
     let step = 0.00625;
     let noise = Noise { temporal: 0.5 * step, step, ..Noise::default() };
     for theta in [0.0, 0.001, 0.3] {
-        let m = measured(&Plane::tilted(1.5, theta, 0.4), &noise, 6, 5, Planes::PerView);
+        let m = measured(&Plane::tilted(1.5, theta, 0.4), &noise, 6, 5);
         // Where all phases of the steps occur, they add the variance of a uniform distribution.
         let truth = if theta < 0.01 { 0.5704 } else { (0.25f64 + 1.0 / 12.0).sqrt() };
         near(m.whole.spread.total_m, truth * step, 0.025, "total");
@@ -162,25 +154,20 @@ fn steps_coarser_than_the_file_are_no_gross_errors() {
 }
 
 #[test]
-fn what_trembles_as_a_whole_is_in_the_total_only_and_goes_with_a_plane_a_frame() {
+fn what_trembles_as_a_whole_is_in_the_total_only() {
     let noise = Noise { temporal: 0.003, jitter: 0.006, ..Noise::default() };
-    let still = measured(&frontal(), &noise, 30, 3, Planes::PerView);
+    let still = measured(&frontal(), &noise, 30, 3);
     near(still.whole.spread.spatial_m, 0.003, 0.05, "spatial");
     assert!(still.whole.spread.total_m > 0.0045, "{}", still.whole.spread.total_m);
-    let own = measured(&frontal(), &noise, 30, 3, Planes::PerFrame);
-    near(own.whole.spread.spatial_m, 0.003, 0.025, "spatial");
-    near(own.whole.spread.total_m, 0.003, 0.025, "total");
 }
 
 /// The drift over 30 frames is three times sigma: regression test, a fixed cut lost 4 % of sigma.
 #[test]
 fn a_drift_does_not_narrow_sigma_and_is_told() {
     let noise = Noise { temporal: 0.003, drift: 0.0003, ..Noise::default() };
-    let m = measured(&frontal(), &noise, 30, 6, Planes::PerView);
+    let m = measured(&frontal(), &noise, 30, 6);
     near(m.whole.spread.spatial_m, 0.003, 0.015, "spatial");
     assert!(m.notes.iter().any(|note| note.contains("drifts")), "{:?}", m.notes);
-    let own = measured(&frontal(), &noise, 30, 6, Planes::PerFrame);
-    near(own.whole.spread.spatial_m, 0.003, 0.015, "spatial, a plane a frame");
 }
 
 /// Tests a stale frame among the first frames, which locate the target, and among the others.
@@ -188,7 +175,7 @@ fn a_drift_does_not_narrow_sigma_and_is_told() {
 fn a_stale_frame_is_left_out_and_named() {
     for stale in [0, 3, 10] {
         let noise = Noise { temporal: 0.003, stale: Some(stale), ..Noise::default() };
-        let m = measured(&frontal(), &noise, 12, 6, Planes::PerView);
+        let m = measured(&frontal(), &noise, 12, 6);
         near(m.plane.depth(0.0, 0.0), frontal().depth(0.0, 0.0), 1e-4, "distance");
         near(m.whole.spread.spatial_m, 0.003, 0.025, "spatial");
         near(m.whole.spread.temporal_m.unwrap(), 0.003, 0.025, "temporal");
@@ -201,7 +188,7 @@ fn a_stale_frame_is_left_out_and_named() {
 #[test]
 fn frames_stored_twice_count_once_and_are_told() {
     let noise = Noise { temporal: 0.003, copies: 1, ..Noise::default() };
-    let m = measured(&frontal(), &noise, 8, 6, Planes::PerView);
+    let m = measured(&frontal(), &noise, 8, 6);
     near(m.whole.spread.temporal_m.unwrap(), 0.003, 0.025, "temporal");
     assert_eq!(m.frames, 8);
     assert!(m.notes.iter().any(|note| note.starts_with("8 of 16 frames")), "{:?}", m.notes);
@@ -210,7 +197,7 @@ fn frames_stored_twice_count_once_and_are_told() {
 #[test]
 fn gross_errors_do_not_widen_sigma() {
     let clean = Noise { temporal: 0.004, ..Noise::default() };
-    let m = measured(&frontal(), &Noise { gross: 0.05, ..clean }, 3, 5, Planes::PerView);
+    let m = measured(&frontal(), &Noise { gross: 0.05, ..clean }, 3, 5);
     // 5 % within +-0.3 m leave 0.12 % of the samples inside the cut: variance +0.4 % at most.
     near(m.whole.spread.spatial_m, 0.004, 0.025, "spatial");
     assert!(m.whole.cut as f64 > 0.04 * m.whole.n as f64, "{} cut of {}", m.whole.cut, m.whole.n);
@@ -219,10 +206,10 @@ fn gross_errors_do_not_widen_sigma() {
 #[test]
 fn a_temporal_filter_is_measured() {
     let noise = Noise { temporal: 0.004, filter: 0.6, ..Noise::default() };
-    let m = measured(&frontal(), &noise, 30, 9, Planes::PerView);
+    let m = measured(&frontal(), &noise, 30, 9);
     let rho = m.temporal_correlation.unwrap();
     assert!((rho - 0.6).abs() < 0.05, "{rho}");
-    let white = measured(&frontal(), &Noise { filter: 0.0, ..noise }, 30, 9, Planes::PerView);
+    let white = measured(&frontal(), &Noise { filter: 0.0, ..noise }, 30, 9);
     assert!(white.temporal_correlation.unwrap().abs() < 0.03);
     assert!(m.whole.n_effective < 0.6 * white.whole.n_effective);
 }
@@ -233,7 +220,7 @@ fn a_temporal_filter_is_measured() {
 #[test]
 fn a_filtered_pixel_has_its_true_temporal_sigma_over_few_frames() {
     let noise = Noise { temporal: 0.004, filter: 0.6, ..Noise::default() };
-    let m = measured(&frontal(), &noise, 6, 4, Planes::PerView);
+    let m = measured(&frontal(), &noise, 6, 4);
     near(m.whole.spread.temporal_m.unwrap(), 0.004, 0.06, "temporal");
 }
 
@@ -243,7 +230,7 @@ fn a_filtered_pixel_has_its_true_temporal_sigma_over_few_frames() {
 fn correlated_noise_of_several_frames_keeps_its_spatial_sigma() {
     let noise = Noise { temporal: 0.004, window: 9, ..Noise::default() };
     let mean = (0..20)
-        .map(|seed| measured(&frontal(), &noise, 5, seed, Planes::PerView).whole.spread.spatial_m)
+        .map(|seed| measured(&frontal(), &noise, 5, seed).whole.spread.spatial_m)
         .sum::<f64>()
         / 20.0;
     near(mean, 0.004, 0.02, "mean over seeds");
@@ -257,7 +244,7 @@ fn the_standard_error_is_the_scatter_over_seeds() {
     for window in [0, 5] {
         let noise = Noise { temporal: 0.004, window, ..Noise::default() };
         let runs: Vec<ViewMeasurement> =
-            (0..60).map(|seed| measured(&frontal(), &noise, 1, seed, Planes::PerView)).collect();
+            (0..60).map(|seed| measured(&frontal(), &noise, 1, seed)).collect();
         let n = runs.len() as f64;
         let mean = runs.iter().map(|m| m.whole.spread.spatial_m).sum::<f64>() / n;
         let scatter = (runs.iter().map(|m| (m.whole.spread.spatial_m - mean).powi(2)).sum::<f64>()
@@ -274,7 +261,7 @@ fn the_standard_error_is_the_scatter_over_seeds() {
 #[test]
 fn a_tilted_view_is_cut_into_bins_that_follow_sigma() {
     let plane = Plane::tilted(1.5, 1.0, 0.0);
-    let m = measured(&plane, &Noise { temporal: 0.004, ..Noise::default() }, 2, 1, Planes::PerView);
+    let m = measured(&plane, &Noise { temporal: 0.004, ..Noise::default() }, 2, 1);
     assert!(m.cells.len() > 5, "{} cells", m.cells.len());
     assert!(m.cells.windows(2).all(|w| w[1].z_m > w[0].z_m));
     let n: usize = m.cells.iter().map(|c| c.n).sum();
@@ -294,13 +281,7 @@ fn a_tilted_view_is_cut_into_bins_that_follow_sigma() {
 fn planes_come_back_within_their_noise() {
     for (k, theta) in [0.0, 0.3, 0.8, 1.2].into_iter().enumerate() {
         let plane = Plane::tilted(1.4, theta, 0.7);
-        let m = measured(
-            &plane,
-            &Noise { temporal: 0.003, ..Noise::default() },
-            1,
-            k as u64,
-            Planes::PerView,
-        );
+        let m = measured(&plane, &Noise { temporal: 0.003, ..Noise::default() }, 1, k as u64);
         assert!((m.theta_rad - theta).abs() < 2e-3, "{theta}: {}", m.theta_rad);
         near(m.axis_distance_m, 1.4, 5e-4, "distance on the axis");
     }
