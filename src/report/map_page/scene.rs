@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::super::trajectories::Against;
 use crate::map::{FrameReport, MapPoint};
-use crate::stats::{quantile, range};
+use crate::stats::{coprime, quantile, range};
 
 /// Quantiles of sigma between which the colours run, on a logarithmic scale.
 const SHOWN: [f64; 2] = [0.02, 0.98];
@@ -131,15 +131,7 @@ fn between(value: f64, [low, high]: [f64; 2]) -> u8 {
 /// All numbers below `n`, each once, in steps of the golden ratio: Weyl's sequence fills evenly.
 fn spread(n: usize) -> impl Iterator<Item = usize> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
-    let coprime = |step: &usize| {
-        let (mut a, mut b) = (n, *step);
-        while b > 0 {
-            (a, b) = (b, a % b);
-        }
-        a == 1
-    };
-    let first = ((n as f64 * GOLDEN) as usize).max(1);
-    let step = (first..).find(coprime).unwrap_or(1);
+    let step = coprime(((n as f64 * GOLDEN) as usize).max(1), n);
     (0..n).map(move |i| (i as u128 * step as u128 % n as u128) as usize)
 }
 
