@@ -51,6 +51,7 @@ fn a_lens_that_folds_is_named() {
     assert!(folds(&[0.0, 0.0, 0.0, 0.0, -1.0], 1.0), "k1 = k2 = 0");
     // Its radius r (1 - 0.8 r^2) reaches 0.43 at most, the corner's is 0.69.
     let barrel = behind([-0.8, 0.0, 0.0, 0.0, 0.0]);
+    assert!(barrel.fault().is_some_and(|f| f.contains("no ray for pixel (0, 0)")));
     assert!(barrel.ray(0.0, 0.0).0.is_nan() && barrel.ray(320.0, 240.0).0.is_finite());
     assert!(!folds(&[-2.5, 2.5, 0.0, 0.0, 0.0], 0.1) && !folds(&[0.0; 5], 1.0));
 }

@@ -65,7 +65,8 @@ impl Sealed {
         let parameters: Vec<Compared> = card
             .parameters
             .iter()
-            .map(|p| Compared::of(p, self.effect.settings.named(card, p.name), answer.finding))
+            .enumerate()
+            .map(|(k, p)| Compared::of(p, self.effect.settings.at(k), answer.finding))
             .collect();
         let mut lines = vec!["\nThe seal is opened:".to_string()];
         lines.extend(self.text.lines().map(|line| format!("  {line}")));
@@ -174,13 +175,13 @@ struct Compared {
 }
 
 impl Compared {
-    fn of(p: &Parameter, truth: Option<f64>, finding: Option<&Finding>) -> Self {
+    fn of(p: &Parameter, truth: f64, finding: Option<&Finding>) -> Self {
         let said = finding.and_then(|f| f.parameters.get(p.name));
         let number = |key: &str| said?.get(key)?.as_f64();
         let found = number("value");
         let interval =
             found.zip(number("std_error")).map(|(v, e)| [v - NORMAL_95 * e, v + NORMAL_95 * e]);
-        Compared { name: p.name, truth: truth.unwrap_or(f64::NAN), found, interval }
+        Compared { name: p.name, truth, found, interval }
     }
 
     fn covers(&self) -> Option<bool> {

@@ -50,6 +50,8 @@ pub struct Correction {
     still: Vec<f32>,
     /// Amplitude of pixel locking, px; 0 without.
     pub(crate) locking_px: f64,
+    /// Shifts that undo it at phases evenly spaced from 0 to 1, px; empty without.
+    pub(crate) unlocking: Vec<f64>,
     /// Whether whole columns have offsets that differ from image to image.
     pub(crate) column_steps: bool,
     /// Terms that depend on more than the pixel.
@@ -91,6 +93,7 @@ impl Correction {
             still_terms: Vec::new(),
             still: Vec::new(),
             locking_px: 0.0,
+            unlocking: Vec::new(),
             column_steps: false,
             terms: Vec::new(),
             needs: Needs::default(),
@@ -116,7 +119,7 @@ impl Correction {
             && self.drifts.is_empty()
             && self.along_ray.is_empty()
             && self.still.is_empty()
-            && self.locking_px == 0.0
+            && self.unlocking.is_empty()
             && !self.column_steps
             && self.terms.is_empty()
     }
@@ -169,7 +172,7 @@ impl Correction {
         let along = self.along_ray.get(i).copied().map_or(1.0, f64::from);
         let still = self.still.get(i).copied().map_or(0.0, f64::from);
         let d = self.scale_px_m * factor * along / f64::from(z) - still;
-        if self.locking_px == 0.0 { d } else { unlocked(d, self.locking_px) }
+        if self.unlocking.is_empty() { d } else { d + interpolated(&self.unlocking, d) }
     }
 
     fn add(&mut self, entry: &model::Effect) -> Result<()> {
@@ -209,7 +212,11 @@ impl Correction {
                 self.along_ray = self.ray_over_depth(share);
             }
             Some(Inverse::ColumnSteps) => self.column_steps = true,
-            Some(Inverse::Locking { amplitude_px }) => self.locking_px = amplitude_px,
+            Some(Inverse::Locking { amplitude_px }) => {
+                let phases = (0..=NODES).map(|k| k as f64 / NODES as f64);
+                self.locking_px = amplitude_px;
+                self.unlocking = phases.map(|d| unlocked(d, amplitude_px) - d).collect();
+            }
             None => {
                 let term = active.effect.term(&active.settings, &self.camera);
                 match term.filter(is_predictable_variance) {
@@ -248,6 +255,19 @@ impl Correction {
             self.still = (0..self.camera.pixels()).map(sum).collect();
         }
     }
+}
+
+/// Nodes for linear interpolation, a thousandth of a pixel apart. For an amplitude of a tenth of a pixel the
+/// inverse has a curvature of a few px per px^2, and the error is 1e-6 px.
+const NODES: usize = 1024;
+
+/// Value at the phase of a disparity.
+fn interpolated(nodes: &[f64], disparity: f64) -> f64 {
+    let last = nodes.len() - 1;
+    let place = disparity.rem_euclid(1.0) * last as f64;
+    let k = (place as usize).min(last - 1);
+    let t = place - k as f64;
+    nodes[k] * (1.0 - t) + nodes[k + 1] * t
 }
 
 /// The disparity that locks to this one, px. Above an amplitude of 1/(2 pi) px there are several; this is one.

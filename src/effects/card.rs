@@ -88,12 +88,6 @@ impl Settings {
     pub fn at(&self, index: usize) -> f64 {
         self.0[index]
     }
-
-    /// The value of the card's parameter of this name.
-    pub fn named(&self, card: &Card, name: &str) -> Option<f64> {
-        let index = card.parameters.iter().position(|p| p.name == name)?;
-        self.0.get(index).copied()
-    }
 }
 
 /// Description of an effect, for people and the command line.

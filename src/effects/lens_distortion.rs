@@ -32,7 +32,7 @@ pub(super) static CARD: Card = Card {
 impl Effect for LensDistortion {
     fn forward(&self, settings: &Settings, exposure: &mut Exposure, _: &Draw) {
         let k1 = settings.at(0);
-        // Of pixels at the distorted coordinates themselves.
+        // A unit camera, whose pixel coordinates are the normalised ones.
         let lens = Camera { distortion: Some([k1, 0.0, 0.0, 0.0, 0.0]), ..Camera::centred(1, 1, 1.0) };
         for i in 0..exposure.pixels() {
             let (x, y) = exposure.rays.at(i);

@@ -82,6 +82,7 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
         ("WIDTH", camera.width),
         ("HEIGHT", camera.height),
         ("DRIFTS", correction.drifts.len()),
+        ("UNLOCKING", correction.unlocking.len()),
         ("BIAS_TERMS", program.bias.len()),
         ("VARIANCE_TERMS", program.variance.len()),
         ("NEEDS_DEPTH", usize::from(correction.needs.depth)),
@@ -117,6 +118,7 @@ fn constants(sensor: &Sensor, correction: &Correction, program: &Program) -> Str
     for (name, numbers) in [
         ("distortion", &camera.distortion.unwrap_or_default()[..]),
         ("drifts", &drifts),
+        ("unlocking", &correction.unlocking),
         ("window_limits", correction.noise.limits()),
     ] {
         text.push_str(&array(&format!("{PREFIX}{name}"), numbers));

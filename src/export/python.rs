@@ -96,6 +96,7 @@ fn constants(sensor: &Sensor, correction: &Correction) -> String {
         ("drifts", format!("[{}]", drifts.join(", "))),
         ("ray_share", number(correction.ray_share)),
         ("locking_px", number(correction.locking_px)),
+        ("unlocking", format!("np.array([\n    {}\n])", listed(&correction.unlocking))),
         ("window_limits", format!("np.array([\n    {}\n])", listed(correction.noise.limits()))),
         ("needs_depth", python(correction.needs.depth)),
         ("needs_slope", python(correction.needs.slope)),

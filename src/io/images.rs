@@ -31,7 +31,7 @@ impl FrameSource {
     /// Reads a frame of a recording, from its own file or a container.
     /// Fails if the file is missing, truncated, or of another kind (8 bit, colour) or size.
     pub fn frame(&mut self, frame: &FrameRef) -> Result<Frame> {
-        read_sized(frame, [self.width, self.height], |bytes| self.hash.update(bytes))
+        read_sized(frame, [self.width, self.height], Some(&mut self.hash))
     }
 
     /// Reads one image file. Fails as [`FrameSource::frame`] does.
@@ -47,24 +47,25 @@ impl FrameSource {
 
 /// Reads one depth frame of this size, px, without hashing.
 pub(crate) fn read_depth(frame: &FrameRef, width: usize, height: usize) -> Result<Frame> {
-    read_sized(frame, [width, height], |_| ())
+    read_sized(frame, [width, height], None)
 }
 
-/// Reads one depth frame of this size, px; `seen` gets the bytes that it is decoded from.
+/// Reads one depth frame of this size, px, and hashes the bytes that it is decoded from.
 fn read_sized(
     frame: &FrameRef,
     [width, height]: [usize; 2],
-    mut seen: impl FnMut(&[u8]),
+    hash: Option<&mut Sha256>,
 ) -> Result<Frame> {
     let (path, mut place) = (&frame.path, String::new());
     let image = if let Some(Within { store, index }) = &frame.within {
         let image = store.frame(*index)?;
-        seen(&image.raw.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>());
+        let words = || image.raw.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
+        hash.into_iter().for_each(|h| h.update(words()));
         place = format!("{}: ", store.place(*index));
         image
     } else {
         let bytes = read_depth_image(path, [width, height])?;
-        seen(&bytes);
+        hash.into_iter().for_each(|h| h.update(&bytes));
         decode(path, &bytes)?
     };
     let Frame { width: w, height: h, .. } = image;

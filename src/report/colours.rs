@@ -48,3 +48,36 @@ pub(super) fn between(anchors: &[u32], share: f64) -> RGBColor {
         |a: u8, b: u8| (f64::from(a) + (at - i as f64) * (f64::from(b) - f64::from(a))).round();
     RGBColor(mix(r0, r1) as u8, mix(g0, g1) as u8, mix(b0, b1) as u8)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Relative luminance of sRGB, as WCAG 2.1 defines it.
+    fn luminance(RGBColor(r, g, b): RGBColor) -> f64 {
+        let linear = |c: u8| {
+            let c = f64::from(c) / 255.0;
+            if c <= 0.03928 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b)
+    }
+
+    #[test]
+    fn thin_lines_stand_out_from_white() {
+        for i in 0..=20 {
+            let line = darker(between(&DISTANCES, f64::from(i) / 20.0));
+            assert!(1.05 / (luminance(line) + 0.05) >= 4.5, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn luminance_is_ordered() {
+        for i in 0..20 {
+            let [a, b] = [f64::from(i) / 20.0, f64::from(i + 1) / 20.0];
+            let rises = |of: &[u32], a, b| luminance(between(of, a)) < luminance(between(of, b));
+            assert!(rises(&DISTANCES, a, b) && rises(&SURFACE, b, a));
+            assert!(rises(&RESIDUALS, 0.5 * a, 0.5 * b));
+            assert!(rises(&RESIDUALS, 0.5 + 0.5 * b, 0.5 + 0.5 * a));
+        }
+    }
+}

@@ -55,9 +55,9 @@ pub fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// The first stride from `stride` on that visits every column of pictures of this width.
-pub fn coprime(stride: usize, width: usize) -> usize {
-    (stride..).find(|&stride| gcd(stride, width) == 1).unwrap_or(1)
+/// The first stride from `stride` on without a common divisor with `n`: its multiples modulo `n` are all of 0..n.
+pub fn coprime(stride: usize, n: usize) -> usize {
+    (stride..).find(|&stride| gcd(stride, n) == 1).unwrap_or(1)
 }
 
 /// Mean of the finite values, if any.

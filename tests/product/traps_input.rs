@@ -293,6 +293,8 @@ fn a_tum_folder_has_one_camera_for_every_command() {
     assert_eq!((camera.fx, camera.cy), (517.3, 255.3));
     assert_eq!(camera.distortion.map(|k| k[0]), Some(0.2624));
     assert!(remarks.iter().any(|r| r.contains("freiburg1: its published camera")), "{remarks:?}");
+    let (camera, _) = write("# file: 'rgbd_dataset_freiburg2_desk.bag'");
+    assert_eq!((camera.fx, camera.distortion.map(|k| k[0])), (520.9, Some(0.2312)));
     let (camera, remarks) = write("# file: 'mine.bag'");
     assert_eq!((camera.fx, camera.distortion), (525.0, None));
     let assumed = "525,525,319.5,239.5 and 5000 units a metre assumed";

@@ -73,19 +73,12 @@ static inline double kinoise_along_ray(const kinoise_place *p)
     return (float)(1.0 + kinoise_ray_share * excess);
 }
 
-/* The disparity that pixel locking turns into this one, by bisection. */
 static inline double kinoise_unlock(double d)
 {
-    double low = d - kinoise_locking_px, high = d + kinoise_locking_px;
-    int k;
-    for (k = 0; k < 50; k++) {
-        double middle = 0.5 * (low + high);
-        if (middle - kinoise_locking_px * sin(6.283185307179586 * middle) < d)
-            low = middle;
-        else
-            high = middle;
-    }
-    return 0.5 * (low + high);
+    double place = (d - floor(d)) * (KINOISE_UNLOCKING - 1), t;
+    int k = place < KINOISE_UNLOCKING - 2 ? (int)place : KINOISE_UNLOCKING - 2;
+    t = place - k;
+    return d + kinoise_unlocking[k] * (1.0 - t) + kinoise_unlocking[k + 1] * t;
 }
 
 /* Disparity of a stored depth without the driver's errors and the pixel's own; NaN for none. */
@@ -96,7 +89,7 @@ static inline double kinoise_measured(int i, float z, double factor, const kinoi
     if (!(z > 0.0f))
         return NAN;
     d = kinoise_scale_px_m * factor * kinoise_along_ray(&p) / z - (float)kinoise_still(p);
-    return kinoise_locking_px != 0.0 ? kinoise_unlock(d) : d;
+    return KINOISE_UNLOCKING > 1 ? kinoise_unlock(d) : d;
 }
 
 /* A plane in disparity over a window: how far its pixels lie off it, px^2, its middle and slope. */

@@ -65,13 +65,10 @@ _still = _sum(_still_terms, _place(np.arange(WIDTH * HEIGHT), 0.0, None, 0.0), N
 
 
 def _unlock(d):
-    """The disparity that pixel locking turns into this one, by bisection."""
-    low, high = d - _locking_px, d + _locking_px
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        below = middle - _locking_px * np.sin(2.0 * np.pi * middle) < d
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return 0.5 * (low + high)
+    place = (d - np.floor(d)) * (len(_unlocking) - 1)
+    k = np.minimum(place.astype(int), len(_unlocking) - 2)
+    t = place - k
+    return d + _unlocking[k] * (1.0 - t) + _unlocking[k + 1] * t
 
 
 def _factor(session_s):
@@ -151,7 +148,7 @@ def _measured(depth_m, session_s):
     seen = z > 0.0
     along = _along_ray() if _ray_share else np.ones(len(z))
     d[seen] = (_scale_px_m * _factor(session_s) * along / np.where(seen, z, 1.0) - _still)[seen]
-    if _locking_px:
+    if len(_unlocking):
         d[seen] = _unlock(d[seen])
     return z, d, np.flatnonzero(seen)
 

@@ -143,5 +143,6 @@ pub(super) fn next_view(next: &NextView) -> Markup {
         @if next.theta_rad.abs() < FACING_RAD { b { "facing it" } ". " }
         @else { b { "tilted by " (tilt) "°" } ", its " b { (far) " " (part) } " farthest away as the sensor sees it. " }
         @if !next.why.is_empty() { (prose(&sentence(&next.why))) " " }
+        "Then add it to the recording and diagnose again."
     }
 }

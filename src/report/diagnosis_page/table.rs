@@ -70,12 +70,15 @@ fn is_of_target(f: &Finding) -> bool {
     !f.terms.is_empty() && f.terms.iter().all(|t| !t.belongs_to_sensor())
 }
 
-/// What to do about a finding, in a few words.
+/// What to do about a finding.
 pub(super) fn advice(f: &Finding) -> String {
     let words = match (f.status, &f.next_view) {
         (Status::OneOf | Status::Unexplained, Some(view)) => {
             let tilt = fixed(view.theta_rad.to_degrees(), 0);
             return format!("one more view: {} m, tilt {tilt}°", fixed(view.z_m, 2));
+        }
+        _ if f.contradicted.is_some() => {
+            "run `kinoise calibrate` again: the model has what the recording does not show"
         }
         (Status::Named, _) if is_of_target(f) => "use a flatter target: the sensor is right",
         (Status::Named, _) if f.is_corrected() => "`kinoise correct` takes it out",

@@ -216,7 +216,11 @@ fn cases() -> [(Diagnosis, &'static [&'static str]); 9] {
         ),
         (
             diagnosis(Mismatch, vec![Finding { contradicted: Some("row-noise"), ..unexplained() }]),
-            &["Row noise, which the recording contradicts: 1.84 mm rms", "not in the recording"],
+            &[
+                "Row noise, which the recording contradicts: 1.84 mm rms",
+                "not in the recording",
+                "the model has what the recording does not show",
+            ],
         ),
         (
             diagnosis(Mismatch, vec![finding(Status::Recalibrate, None)]),
