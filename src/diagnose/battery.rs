@@ -169,7 +169,9 @@ impl Case<'_> {
             && matches!(f.axis, Axis::Z | Axis::DisparityPhase | Axis::Radius | Axis::Pixel)
             && own_step(self.lattice, self.recording, px_m).is_none()
             && f.size.sigma * sigma_px < 0.3 * coarsest;
-        let textures = !scatter.textures.is_empty() || scatter.tails.is_some();
+        let of_all =
+            |t: &TextureFinding| t.of_some.is_none() && t.statistic != Statistic::Distribution;
+        let textures = scatter.textures.iter().any(of_all) || scatter.tails.is_some();
         let textured = scatter.tails.as_ref().is_some_and(TextureFinding::are_far_errors)
             || (textures && f.size.sigma < LEVEL_BESIDE_TEXTURE);
         let tailed = textured && f.status == Status::Recalibrate;

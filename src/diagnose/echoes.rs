@@ -54,7 +54,8 @@ const SPREADS: [&str; 6] = [
 
 fn spreads(f: &Finding) -> bool {
     // The size of a texture in some views is that in these; the size of a mean error is that in all views.
-    let of_all = f.of_some.is_none() || f.statistic == Statistic::Bias;
+    let of_all =
+        f.of_some.is_none() || f.statistic == Statistic::Bias && f.axis != Axis::EdgeDistance;
     let named = matches!(f.status, Status::Named | Status::OneOf) && of_all;
     named && (f.statistic == Statistic::Bias || f.effect.is_some_and(|id| SPREADS.contains(&id)))
 }

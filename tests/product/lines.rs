@@ -75,23 +75,25 @@ fn lines_of_two_readouts_are_seen_and_learnt() {
     }
 }
 
-/// In three quarters of the views: the noise is named, with .75 of its variance in the mean over all views, and
-/// it is no bias, even where a tilted target's disparity changes with the row.
+/// In half of the views and in three quarters: the noise is named, and it is no bias, even where a tilted
+/// target's disparity changes with the row.
 #[test]
-fn rows_that_err_afresh_in_most_of_the_views_are_row_noise_and_no_bias() {
-    const NOISY: usize = 9;
+fn rows_that_err_afresh_in_a_part_of_the_views_are_row_noise_and_no_bias() {
     let effect = Active::parse("row-noise:sigma_px=0.03").expect("an effect");
     let (_noisy, noisy) = wall(vec![effect]);
     let (_plain, plain) = wall(Vec::new());
-    let views = noisy.views[..NOISY].iter().chain(&plain.views[NOISY..]).cloned().collect();
-    let recording = Recording { views, ..plain.clone() };
-    let (model, options) = (NoiseModel::paper(), DiagnoseOptions::default());
-    let said = diagnose(&recording, &model, &options, &|_, _| ()).expect("diagnosed").diagnosis;
-    let rows = said.findings.iter().find(|f| f.effect == Some("row-noise")).expect("its name");
-    assert_eq!(rows.status, Status::Named);
-    let sigma_px = rows.value("sigma_px").expect("a size");
-    assert!((sigma_px / 0.026 - 1.0).abs() < 0.1, "{sigma_px}");
-    let bias = said.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
-    let bias: Vec<_> = bias.filter(|f| f.statistic == Statistic::Bias).collect();
-    assert!(bias.is_empty(), "{bias:?}");
+    // In three quarters of the views the mean over all views is reported: .75 of the variance.
+    for (some, told_px) in [(6, 0.03), (9, 0.026)] {
+        let views = noisy.views[..some].iter().chain(&plain.views[some..]).cloned().collect();
+        let recording = Recording { views, ..plain.clone() };
+        let (model, options) = (NoiseModel::paper(), DiagnoseOptions::default());
+        let said = diagnose(&recording, &model, &options, &|_, _| ()).expect("diagnosed").diagnosis;
+        let rows = said.findings.iter().find(|f| f.effect == Some("row-noise")).expect("its name");
+        assert_eq!(rows.status, Status::Named);
+        let sigma_px = rows.value("sigma_px").expect("a size");
+        assert!((sigma_px / told_px - 1.0).abs() < 0.1, "{sigma_px} in {some} views");
+        let bias = said.findings.iter().filter(|f| f.status != Status::NotIdentifiable);
+        let bias: Vec<_> = bias.filter(|f| f.statistic == Statistic::Bias).collect();
+        assert!(bias.is_empty(), "{some}: {bias:?}");
+    }
 }

@@ -2,10 +2,11 @@
 //! found subtracted from the residuals in memory. Losses and steps of the raw values, which no model changes,
 //! are those of the first run.
 
+use super::far_off::far_off;
 use crate::diagnose::battery::Battery;
 use crate::diagnose::case::Case;
-use crate::diagnose::diagnosis::{After, Finding, Remaining};
-use crate::diagnose::finding::pixels::subtract_terms;
+use crate::diagnose::diagnosis::{After, Finding, Remaining, Verdict};
+use crate::diagnose::finding::pixels::{subtract_terms, typical_sigma_mm};
 use crate::diagnose::verdict::verdict;
 use crate::diagnose::views::known::KnownTerms;
 use crate::model::{Effect, NoiseModel};
@@ -26,8 +27,14 @@ impl<'a> Case<'a> {
         subtract_terms(&mut fields, [&bias, &added.variance], self.survey.light, &self.bench);
         let mut case = self.again(fields, extended);
         let battery = case.battery();
+        let mut after = after(&battery, explained);
+        if battery.found.is_empty()
+            && far_off(&case.survey, typical_sigma_mm(&case.fields)).is_some()
+        {
+            after.verdict = Verdict::Mismatch;
+        }
         case.fields.iter_mut().zip(means).for_each(|(field, mean)| field.mean = mean);
-        (after(&battery, explained), case)
+        (after, case)
     }
 
     /// Terms that the extended model adds to the given one.

@@ -104,6 +104,7 @@ fn beyond_known<'a>(found: &TextureFinding, known: &'a KnownTerms) -> Option<OfV
         (Some(id), ..) => return beyond(id, known),
         (None, Axis::Column, Statistic::Bias) => Box::new(|s| s.still.lines_px2[0]),
         (None, Axis::Row, Statistic::Bias) => Box::new(|s| s.still.lines_px2[1]),
+        (None, Axis::Residual, _) => Box::new(|s| Some(s.skewness()?[0])),
         (None, Axis::Pixel, _) => Box::new(|s| s.still.blotches_px2),
         (None, Axis::Column, _) => Box::new(|s| s.column_px2),
         (None, Axis::Frame, Statistic::Correlation) => Box::new(|s| Some(s.tilts?.beyond())),

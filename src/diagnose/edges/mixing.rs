@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Edges, INSIDE_PX};
 use crate::diagnose::finding::parameters::one;
+use crate::diagnose::noise::some_views::SomeViews;
 use crate::diagnose::noise::texture_finding::TextureFinding;
 use crate::diagnose::noise::view_mean::{ViewMean, nats};
 use crate::diagnose::views::field::Field;
@@ -116,15 +117,32 @@ fn best(edges: &[&Edges], twins: Option<&[&Edges]>, widths: &[f64]) -> Option<Fo
     seen.reduce(|a, b| if b.1.1 - a.1.1 > ROUNDING * a.1.1.abs() { b } else { a })
 }
 
-/// Finding of depth mixing at the edge, if the views show it at this level.
+/// Views whose edges mix while the others' do not, the number of views measured, and the p-value.
+fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, usize, f64)> {
+    let at = |width: &f64| {
+        let sure = |e: &&'a Edges| share(e, *width).map(|(value, sure)| (*e, value * sure.sqrt()));
+        let (seen, off): (Vec<&Edges>, Vec<f64>) = edges.iter().filter_map(sure).unzip();
+        let some = SomeViews::above(&off)?;
+        Some((some.which.iter().map(|&v| seen[v]).collect::<Vec<_>>(), seen.len(), some.p))
+    };
+    TRIED_PX.iter().filter_map(at).min_by(|a, b| a.2.total_cmp(&b.2))
+}
+
+/// Finding of depth mixing at the edge, if all or some of the views show it at this level.
 pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<TextureFinding> {
     let edges: Vec<&Edges> = fields.iter().map(|f| &f.edges).collect();
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
     let twins = twins.as_deref();
     let tried = TRIED_PX.len() as f64;
     let p = (tried * best(&edges, twins, &TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
-    let footprint = (p <= level).then(|| best(&edges, twins, &WIDTHS_PX)).flatten()?;
-    found(&edges, footprint, p)
+    if p <= level {
+        return found(&edges, best(&edges, twins, &WIDTHS_PX)?, p);
+    }
+    // This is the second test at the level.
+    let (some, of, p) = twins.is_none().then(|| mixing_views(&edges)).flatten()?;
+    let p = 2.0 * tried * p;
+    let footprint = (p <= level).then(|| best(&some, None, &WIDTHS_PX)).flatten()?;
+    Some(found(&some, footprint, p)?.of_some([some.len(), of], p))
 }
 
 fn found(edges: &[&Edges], (width, (share, _)): Footprint, p: f64) -> Option<TextureFinding> {

@@ -7,8 +7,9 @@ use super::*;
 use crate::camera::Camera;
 use crate::diagnose::edges::EdgeLoss;
 use crate::diagnose::edges::mixing::mixing;
-use crate::diagnose::edges::shadow::{Sides, band};
+use crate::diagnose::edges::shadow::{Band, Sides, band};
 use crate::diagnose::missing::LEVEL;
+use crate::diagnose::missing::report::shadow_finding;
 use crate::frame::DepthCode;
 use crate::plane::Plane;
 use crate::rng::{Seed, Stream};
@@ -222,6 +223,22 @@ fn a_band_is_a_shadow_when_it_is_on_one_side_and_as_wide_as_it_must_be() {
     assert!(band(&shadows(|e| [f64::from(e > 25.0), 0.0]), LEVEL).is_none(), "a stray pixel");
 }
 
+/// The last three of ten views lose on the right what the geometry predicts; one pixel each would be no shadow.
+#[test]
+fn a_shadow_of_some_views_is_told_with_how_many() {
+    let last = |e: f64| if e > 21.0 { 0.9 * e } else { 0.0 };
+    let found = band(&shadows(|e| [0.0, last(e)]), LEVEL).expect("a shadow");
+    assert_eq!((found.of_some, found.side), (Some([3, 10]), 1));
+    assert!(found.lawful && (found.share[0] - 0.9).abs() < 0.05, "{found:?}");
+    let nameless = shadow_finding(Band { lawful: false, ..found }, &[]).shape.expect("a shape");
+    assert!(nameless.ends_with(" px, in 3 of 10 views"), "{nameless}");
+    let lines = |e: f64| if e > 21.0 { 1.0 } else { 0.0 };
+    assert!(
+        band(&shadows(|e| [0.0, lines(e)]), LEVEL).is_none(),
+        "a line is what a border errs by"
+    );
+}
+
 /// Twelve views with a few lost readings each, as in a shadow of some thousandths: told where the background
 /// beyond loses none, but not where it loses as many, nor where one view alone loses them.
 #[test]
@@ -240,7 +257,7 @@ fn a_thin_shadow_is_seen_by_the_counts() {
     };
     let few = [0.0, 1.0, 0.0, 2.0, 1.0, 0.0, 3.0, 0.0, 1.0, 0.0, 3.0, 1.0];
     let found = thin(few, 0.0).expect("a shadow");
-    assert!(found.lawful && found.share[0] < 0.01, "{found:?}");
+    assert!(found.lawful && found.of_some.is_none() && found.share[0] < 0.01, "{found:?}");
     assert!(thin(few, 5.0).is_none(), "as much is lost beyond it");
     let mut one = [0.0; 12];
     one[3] = 14.0;
@@ -256,7 +273,26 @@ fn a_shadow_of_three_views_is_seen() {
         band(&views[..3], LEVEL)
     };
     let found = of_three(&|e| 0.7 * e).expect("6, 7 and 8 px");
-    assert!(found.lawful && (found.share[0] - 0.7).abs() < 0.05);
+    assert!(found.lawful && found.of_some.is_none() && (found.share[0] - 0.7).abs() < 0.05);
     assert!(of_three(&|_| 1.0).is_none(), "a pixel each");
     assert!(of_three(&|e| if e > 11.0 { 30.0 } else { 0.0 }).is_none(), "in one view");
+}
+
+/// Four of fourteen views have footprints of 4 px to either side.
+#[test]
+fn mixing_of_some_views_is_told_with_how_many() {
+    let mixed = |inside: isize, _: &mut Stream| {
+        let seen = 0.5 * (1.0 - (inside as f64 + 0.5) / 4.0).max(0.0);
+        Some(if inside >= 0 { seen } else { 0.0 })
+    };
+    let clean = |_: isize, _: &mut Stream| Some(0.0);
+    let mut all = views(21, &clean);
+    all.truncate(10);
+    let mut some = views(22, &mixed);
+    some.truncate(4);
+    all.extend(some);
+    let found = mixing(&all, None, LEVEL).expect("mixing");
+    assert!(found.families == ["edge-mixing"]);
+    let words = found.words.unwrap();
+    assert!(found.of_some == Some([4, 14]) && words.ends_with("in 4 of 14 views"), "{words}");
 }

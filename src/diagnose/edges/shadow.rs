@@ -6,6 +6,7 @@
 use super::{EdgeLoss, Edges};
 use crate::diagnose::checks::replication::agree;
 use crate::diagnose::diagnosis::Curve;
+use crate::diagnose::noise::some_views::SomeViews;
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::null::student;
 use crate::stats::student_upper;
@@ -23,6 +24,8 @@ pub struct Band {
     pub gain: [f64; 2],
     pub p: f64,
     pub curve: Curve,
+    /// Views that have it, of how many, where not all do.
+    pub of_some: Option<[usize; 2]>,
 }
 
 const MIN_VIEWS: usize = 3;
@@ -33,7 +36,7 @@ const WIDEST: f64 = 1.4;
 /// Standard error of one view's border, px; its rows err together.
 const BORDER_PX: f64 = 0.7;
 /// Shares of the level on each of the two sides: for the views' agreement on a share of the width; for what
-/// exceeds the border error; for the counts.
+/// exceeds the border error, in all views or in some; for the counts.
 const SHARES: [f64; 3] = [1.0 / 12.0, 1.0 / 24.0, 0.25];
 /// Share of the best curve's gain that a name must reach.
 const SHADOW_ADEQUATE: f64 = 0.6;
@@ -90,16 +93,40 @@ fn nats(share: &ViewMean, views: &[EdgeLoss], of: impl Fn(&EdgeLoss) -> f64) -> 
         + 0.5 * views.iter().map(explained).sum::<f64>()
 }
 
-/// Band of losses that the views show at this level.
+/// Band of losses that all of the views, or some of them, show at this level.
 pub fn band(views: &[Sides], level: f64) -> Option<Band> {
-    band_of(views).filter(|band| band.p <= level)
+    let all = band_of(views)?;
+    if all.p <= level {
+        return Some(all);
+    }
+    let sides = [0, 1].iter().filter_map(|side| shaded_views(views, *side));
+    sides.min_by(|a, b| a.p.total_cmp(&b.p)).filter(|b| b.p <= level)
 }
+
+/// Band of those views that lose more on this side than the border error.
+fn shaded_views(views: &[Sides], side: usize) -> Option<Band> {
+    let seen: Vec<(Sides, EdgeLoss)> =
+        views.iter().filter_map(|s| Some((*s, s.0[side]?))).collect();
+    let widths: Vec<f64> = seen.iter().map(|(_, v)| v.lost / v.rows).collect();
+    let some = SomeViews::beyond(&widths, BORDER_PX, OF_A_CONSTANT)?;
+    let shaded: Vec<Sides> = some.which.iter().map(|&v| seen[v].0).collect();
+    let p = (some.p / SHARES[1]).min(1.0);
+    let of_some = Some([shaded.len(), seen.len()]);
+    Some(Band { p, of_some, ..band_on(&shaded, side)? })
+}
+
+/// Degrees of freedom of a constant, which these views do not estimate: Student's t is then normal.
+const OF_A_CONSTANT: usize = 1000;
 
 /// Band on the side that loses more, whatever its significance.
 fn band_of(views: &[Sides]) -> Option<Band> {
+    let [left, right] = by_side(views).map(|(_, share)| share.map_or(0.0, |share| share.value));
+    band_on(views, usize::from(right > left))
+}
+
+fn band_on(views: &[Sides], side: usize) -> Option<Band> {
     let sides = by_side(views);
     let share = |side: usize| sides[side].1.map_or(0.0, |share| share.value);
-    let side = usize::from(share(1) > share(0));
     let (views, lawful) = (&sides[side].0, sides[side].1?);
     let even = law(views, |v| v.rows)?;
     let p = [lawful.p_above(0.0), beyond_borders(views), by_counts(views)];
@@ -113,6 +140,7 @@ fn band_of(views: &[Sides]) -> Option<Band> {
         gain,
         p,
         curve: curve(views, lawful.value),
+        of_some: None,
     })
 }
 

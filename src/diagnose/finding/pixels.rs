@@ -26,7 +26,8 @@ pub(in crate::diagnose) fn common(
     known: &KnownTerms,
 ) -> [f64; 3] {
     let in_time = ["frozen-noise", "temporal-correlation"];
-    let told = textures.iter().flat_map(|h| &h.families).any(|f| in_time.contains(f))
+    let of_all = textures.iter().filter(|t| t.of_some.is_none());
+    let told = of_all.flat_map(|h| &h.families).any(|f| in_time.contains(f))
         || in_time.iter().any(|id| known.has(id));
     if !told {
         return [0.0; 3];

@@ -188,9 +188,10 @@ impl Scatter {
         let (mut sums, mut n) = ([0.0; 4], [0.0; 4]);
         let mut neighbours = Neighbours::default();
         for (cells, left) in views.iter().zip(left).filter(|(cells, _)| !cells.is_empty()) {
-            let points = cells.iter().zip(left).map(|(c, y)| ([c.place.x, c.place.y], *y, 0.25));
+            let points = cells.iter().zip(left).map(|(c, y)| ([c.place.x, c.place.y], *y, 1.0));
             let (mut a, b) = plane_equations(points);
-            a += Matrix3::from_diagonal(&Vector3::new(1e-6, 0.25, 0.25));
+            // The slopes are held as by one cell.
+            a += Matrix3::from_diagonal(&Vector3::new(0.0, 1.0, 1.0));
             let own = a.lu().solve(&b).unwrap_or_default();
             sums[0] += (left.iter().sum::<f64>() / left.len().max(1) as f64).powi(2);
             sums[1] += own.y.powi(2) + own.z.powi(2);

@@ -102,12 +102,13 @@ pub fn missing(
         .collect();
     if let Some(band) = band(&sides, LEVEL) {
         let mut shadow = shadow_finding(band, fields);
-        shadow.replicated = bands_agree(&sides, &seen.second);
+        let of_all = shadow.of_some.is_none();
+        shadow.replicated = of_all.then(|| bands_agree(&sides, &seen.second)).flatten();
         // Where the target's own mask reaches into its shadow, the search finds the same losses again. A
         // region that was given ends at the target.
         let grown = seen.region_given.contains(&false);
         let larger = |f: &Finding| f.size.sigma > shadow.size.sigma;
-        outcome.findings.retain(|f| !grown || f.effect.is_some() || larger(f));
+        outcome.findings.retain(|f| !grown || !of_all || f.effect.is_some() || larger(f));
         outcome.findings.push(shadow);
     }
     outcome

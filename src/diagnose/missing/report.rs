@@ -246,10 +246,15 @@ pub fn shadow_finding(band: Band, fields: &[Field]) -> Finding {
         size: Size { mm: 0.0, sigma: lost / (asked + lost).max(1.0) },
         p_adjusted: Some(band.p),
         curve: Some(band.curve),
+        of_some: band.of_some,
         ..named(family.unwrap_or_default(), Statistic::Dropout, Axis::EdgeDistance)
     };
     let rivals = [("occlusion-shadow", band.gain[0]), ("edge-distance", band.gain[1])];
-    described(finding, family, &rivals, None)
+    let mut finding = described(finding, family, &rivals, None);
+    let which = finding.which_views();
+    finding.physics.extend(which.iter().map(|which| format!(" Measured here: {which}.")));
+    finding.shape.iter_mut().for_each(|s| s.extend(which.iter().map(|which| format!(", {which}"))));
+    finding
 }
 
 /// Adds the name, if there is one, the rivals, and the description of both.

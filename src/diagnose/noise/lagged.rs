@@ -25,10 +25,25 @@ impl Structure {
         (self.repeats() / (self.pixels * pairs)).sqrt() / (1.0 - self.rounding)
     }
 
+    /// Same of successive frames beside a pattern of this variance, which varies by chance over a view's
+    /// pixels.
+    pub fn lagged_error_beside(&self, pattern_px2: f64) -> f64 {
+        let changes = self.lagged.iter().flatten().count() as f64;
+        let (share, left) = self.pattern_share(pattern_px2);
+        let of_pattern = share / left * (2.0 / self.pixels).sqrt();
+        self.lagged_error(changes).hypot(of_pattern)
+    }
+
     /// Correlation of a pixel with itself 1, 2 and 3 frames later, without a pattern of this variance.
     pub fn beside_pattern(&self, pattern_px2: f64) -> [Option<f64>; 3] {
+        let (share, left) = self.pattern_share(pattern_px2);
+        self.lagged.map(|c| Some((c? - share) / left))
+    }
+
+    /// Share of a pattern in the variance, and the rest.
+    fn pattern_share(&self, pattern_px2: f64) -> (f64, f64) {
         let share = (pattern_px2.max(0.0) / self.noise_px2().max(1e-12)).min(LARGEST_PATTERN);
-        self.lagged.map(|c| Some((c? - share) / (1.0 - share)))
+        (share, 1.0 - share)
     }
 }
 

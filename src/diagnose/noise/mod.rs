@@ -13,6 +13,8 @@ pub mod moments;
 pub mod outliers;
 pub mod pairs;
 pub mod scatter;
+pub mod skewness;
+pub mod some_views;
 pub mod still;
 pub mod structure;
 pub mod structures;
@@ -30,9 +32,10 @@ use crate::terms::{Axis, Statistic};
 use frame_means::{frame_means, jitter_px2};
 use frame_tilts::frame_tilts;
 use frames::{flicker, unequal};
-use in_time::{FIXED_PATTERN, in_time};
+use in_time::{FIXED_PATTERN, in_time, pattern_px2};
 use moderated::{Moderated, near};
 use pairs::REACH_PX;
+use some_views::some_views;
 use still::Still;
 use structure::Structure;
 use texture_finding::TextureFinding;
@@ -74,19 +77,68 @@ fn tell_pattern_once(found: &mut Vec<TextureFinding>) {
 }
 
 /// Further mismatches of a recording by itself, besides those in `found`. Not for a comparison with a
-/// simulation: there, frames differ for no reason that could be stated.
+/// simulation: there, views and frames differ for no reason that could be stated.
 pub fn further_textures(
     views: &[Structure],
     known: &KnownTerms,
     level: f64,
     found: &[TextureFinding],
 ) -> Vec<TextureFinding> {
-    let tilts = frame_tilts(views, jitter_px2(found, known), level);
+    let mut all = textures_of_some(views, known, level, found);
+    all.extend(frame_tilts(views, jitter_px2(found, known), level));
     let of_frames =
         |f: &TextureFinding| f.statistic == Statistic::Variance && f.axis == Axis::Frame;
-    let flicker = (!found.iter().any(of_frames)).then(|| flicker(views, level)).flatten();
-    tilts.into_iter().chain(flicker).collect()
+    all.extend((!found.iter().any(of_frames)).then(|| flicker(views, level)).flatten());
+    all
 }
+
+/// Textures that only some of the views have, besides those `found` in all.
+fn textures_of_some(
+    views: &[Structure],
+    known: &KnownTerms,
+    level: f64,
+    found: &[TextureFinding],
+) -> Vec<TextureFinding> {
+    type OfView<'a> = &'a dyn Fn(&Structure) -> Option<f64>;
+    type Error<'a> = &'a dyn Fn(&Structure) -> f64;
+    type OfAll = fn(&[Structure], &KnownTerms, f64) -> Vec<TextureFinding>;
+    // Skips what was found or is in the model: about a model's value the views need
+    // not scatter symmetrically.
+    let told = |ids: &[&str]| {
+        let found = found.iter().flat_map(|f| &f.families).any(|f| ids.contains(f));
+        found || ids.iter().any(|id| known.has(id))
+    };
+    let beside = pattern_px2(views, found, known);
+    // Relative to the view's own variance, so that near and far views scatter alike.
+    let all: [(&[&str], OfView, Error, OfAll); 3] = [
+        (&[ROW_NOISE], &|s| Some(s.row_px2? / s.variance_px2), &|s| s.line_error(0), lines),
+        // Quantisation errors are constant: where the steps are too coarse for a neighbour
+        // correlation, frames are alike too.
+        (
+            &["frozen-noise", "temporal-correlation"],
+            &|s| s.neighbour_correlation.and(s.beside_pattern(beside)[0]),
+            &|s| s.lagged_error_beside(beside),
+            in_time,
+        ),
+        (
+            &["spatial-correlation"],
+            &|s| s.neighbour_correlation,
+            &|s| s.near_error,
+            |views, known, level| window(views, known, level).into_iter().collect(),
+        ),
+    ];
+    let of = |(ids, of_view, error, of_all): (&[&str], OfView, Error, OfAll)| {
+        // Second test of each texture at this level.
+        let some = some_views(views, of_view, Some(error)).filter(|some| 2.0 * some.p < level)?;
+        let shown = of_all(&some.views, known, AMONG_SOME).into_iter();
+        let mut named = shown.filter(|f| f.families.iter().any(|id| ids.contains(id)));
+        Some(named.next()?.of_some([some.views.len(), some.of], 2.0 * some.p))
+    };
+    all.into_iter().filter(|test| !told(test.0)).filter_map(of).collect()
+}
+
+/// Level for naming a texture once it is certain that some views have it.
+const AMONG_SOME: f64 = 0.05;
 
 /// Factor below which two window sides are the same.
 const SAME_WINDOW: f64 = 1.12;
@@ -202,5 +254,8 @@ pub fn still_errors(views: &[Structure], known: &KnownTerms, level: f64) -> Vec<
     found.collect()
 }
 
+#[cfg(test)]
+#[path = "further_tests.rs"]
+mod further_tests;
 #[cfg(test)]
 mod tests;

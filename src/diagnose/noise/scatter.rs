@@ -1,6 +1,7 @@
 //! Scatter about the mean: structure, size and tails of the noise.
 
 use super::lines::LearntLines;
+use super::skewness::skewness;
 use super::still::beside_bias;
 use super::structure::Structure;
 use super::structures::{shared, structures};
@@ -44,7 +45,7 @@ impl Case<'_> {
         let theirs = self.baseline.as_ref().map(|b| b.steps);
         let extra = |p: &PixelContext| (own.at(p) - theirs.map_or(0.0, |s| s.at(p))).max(0.0);
         let each = self.level(EACH_LEVEL);
-        let textures = self.textures(&mut structure, each);
+        let mut textures = self.textures(&mut structure, each);
         self.learn_lines(mean, &textures);
         self.weigh_rows(mean, &structure, &textures);
         self.survey.compare_frames(&self.fields, common(&structure, &textures, &self.known));
@@ -86,6 +87,13 @@ impl Case<'_> {
         let confusers = Confusers { uneven, simulated: self.baseline.is_some(), stepped };
         let tails = tails(&structure, &self.known, each, confusers)
             .filter(|t| !alike && self.stands(t.p, each));
+        // Far errors on one side alone cause tails and skewness; skewed noise has an excess fourth moment.
+        let far = tails.as_ref().is_some_and(TextureFinding::are_far_errors);
+        let may_be = self.baseline.is_none() && !far;
+        let skewed = may_be.then(|| skewness(&structure, each)).flatten();
+        let skewed = skewed.filter(|t| self.stands(t.p, each));
+        let tails = tails.filter(|t| skewed.is_none() || !t.are_weak_tails());
+        textures.extend(skewed);
         ScatterResult { structure, textures, tails, outcome }
     }
 

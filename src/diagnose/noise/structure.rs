@@ -108,6 +108,12 @@ impl Structure {
         repeats_of_box(self.window_px.unwrap_or(1.0).max(1.0))
     }
 
+    /// Skewness of the disparity and of the depth; for noise of s times the disparity the latter is 6 s less.
+    pub fn skewness(&self) -> Option<[f64; 2]> {
+        let disparity = self.moments.skewness()?;
+        Some([disparity, disparity - 6.0 * self.relative_sigma])
+    }
+
     /// Variance without whole lines and before rounding, px^2.
     pub fn noise_px2(&self) -> f64 {
         (self.variance_px2 - self.lines_px2) * (1.0 - self.rounding)

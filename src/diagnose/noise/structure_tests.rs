@@ -49,6 +49,14 @@ fn rounding_lowers_no_share_that_stands_still() {
     assert!(rounded(0.3).is_some() && rounded(0.28).is_none());
 }
 
+/// By hand: the noise of one frame is 1 px^2, that of a mean of four .25, and five other views share .16.
+#[test]
+fn an_error_that_views_share_inflates_their_mean() {
+    let structure = Structure { variance_px2: 1.16, ..Structure::default() };
+    let excess = structure.excess_of_pattern(0.16, 4.0, 6.0, &Correlation::white());
+    approx::assert_relative_eq!(excess, 1.0 + 5.0 * 0.16 / (0.25 + 0.16), epsilon = 1e-12);
+}
+
 /// A square of white pixels whose rows share an error half as large: variance of a row's mean, and of its
 /// mean square, over that of as many independent pixels.
 #[test]

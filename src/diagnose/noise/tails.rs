@@ -4,9 +4,10 @@ use serde_json::{Map, json};
 
 use super::mixture::Mixture;
 use super::outliers::{Outliers, outliers};
+use super::some_views::Above;
 use super::structure::Structure;
 use super::tail_counts::{GAUSSIAN_TAIL, TAIL_EDGES, TailCounts};
-use super::tails_of_some::{Above, tailed_views};
+use super::tails_of_some::tailed_views;
 use super::texture_finding::{EXCESS, TextureFinding};
 use super::view_mean::{ViewMean, nats};
 use crate::diagnose::finding::parameters::estimate;

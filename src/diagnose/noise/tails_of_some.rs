@@ -2,27 +2,13 @@
 
 use statrs::distribution::{DiscreteCDF, Poisson};
 
+use super::some_views::{Above, min_views};
 use super::structure::Structure;
 use super::tail_counts::{MIN_READINGS, TAIL_EDGES};
 use crate::stats::{at_least, normal_beyond};
 
-/// Fewer views than this, or than this share of all, are outliers.
-const MIN_VIEWS: usize = 3;
-const MIN_SHARE: f64 = 0.2;
 /// A view has tails where so many far readings have a probability below this.
 const CLEAR: f64 = 1e-3;
-
-/// Views that lie above the others, the number of views measured, and the p-value.
-pub struct Above {
-    pub views: Vec<Structure>,
-    pub of: usize,
-    pub p: f64,
-}
-
-/// Fewest views, out of this many, that are more than outliers.
-fn min_views(views: usize) -> usize {
-    MIN_VIEWS.max((MIN_SHARE * views as f64).ceil() as usize)
-}
 
 /// Views with tails that the others do not have: those whose share beyond four sigma is above `heavy`, if there
 /// are at least [`min_views`] of them. Noise alone has a share of up to `expected`.

@@ -106,13 +106,13 @@ impl ViewMean {
 }
 
 /// Weights of values by the sizes of what they were measured on.
-struct Weight {
+pub struct Weight {
     sized: bool,
     middle: f64,
 }
 
 impl Weight {
-    fn of(values: &[(f64, f64)]) -> Self {
+    pub fn of(values: &[(f64, f64)]) -> Self {
         let sizes = values.iter().map(|v| v.1).filter(|size| *size > 0.0);
         let middle = mean(sizes);
         Weight { sized: middle.is_some(), middle: middle.unwrap_or(0.0) }
@@ -120,7 +120,7 @@ impl Weight {
 
     /// Weight for this size. Small views say little; large ones level off, as views
     /// differ for other reasons too.
-    fn at(&self, size: f64) -> f64 {
+    pub fn at(&self, size: f64) -> f64 {
         if self.sized { size / (size + ERROR_OVER_OWN * self.middle) } else { 1.0 }
     }
 

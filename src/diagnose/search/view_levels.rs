@@ -22,6 +22,7 @@ pub fn view_scatter(blocks: &[ViewData], tolerance: f64) -> f64 {
         // The chance difference of two runs may follow any law of the distance.
         _ if tolerance > MODEL_TOLERANCE => &[&LAWS[..1]],
         12.. => &[&LAWS],
+        // Level, distance, time, temperature.
         10.. => &[&LAWS[..4], &[LAWS[0], LAWS[1], LAWS[4], LAWS[5]]],
         9.. => &[&LAWS[..4]],
         _ => &[&LAWS[..2]],

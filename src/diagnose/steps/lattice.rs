@@ -167,20 +167,20 @@ impl RawHistogram {
             let z = sensor.code.metres(u16::try_from(w).ok()?)?;
             Some(if step.is_of_depth { z } else { scale_px_m / z })
         };
-        let step = step.size;
+        let size = step.size;
         let fine = |&(w, n): &(usize, f64)| {
             let place = at(w)?;
             let width = (at(w + 1)? - place).abs();
-            (width < COARSE * step).then_some((place, n.sqrt()))
+            (width < COARSE * size).then_some((place, n.sqrt()))
         };
         let words: Vec<(f64, f64)> = self.occurring().iter().filter_map(fine).collect();
         let range = crate::stats::range(words.iter().map(|w| w.0));
-        if words.len() < MIN_WORDS || range[1] - range[0] < step {
+        if words.len() < MIN_WORDS || range[1] - range[0] < size {
             return None;
         }
-        let cycles = (range[1] - range[0]) / step;
+        let cycles = (range[1] - range[0]) / size;
         let tries = (2.0 * STEP_ERROR * cycles / PHASE_STEP).ceil().clamp(1.0, 1e4);
-        let tried = |k: f64| step * (1.0 - STEP_ERROR + 2.0 * STEP_ERROR * k / tries);
+        let tried = |k: f64| size * (1.0 - STEP_ERROR + 2.0 * STEP_ERROR * k / tries);
         let tries =
             (0..=tries as usize).map(|k| Gathered::of(&words, 1.0 / tried(k as f64)).resultant);
         Some(tries.fold(0.0, f64::max) > GATHERED_AT_ALL)

@@ -180,9 +180,13 @@ impl Kind {
         step.filter(|step| step.is_of_depth == self.is_of_depth())
     }
 
+    fn step(&self, size: f64) -> Step {
+        Step { is_of_depth: self.is_of_depth(), size, p: None }
+    }
+
     /// Variance that a step adds in each view, as a share of the noise variance.
     fn added(&self, size: f64, fields: &[Field]) -> impl Iterator<Item = f64> {
-        let step = Step { is_of_depth: self.is_of_depth(), size, p: None };
+        let step = self.step(size);
         fields.iter().map(move |f| {
             let sigma = f.middle_sigma_px().map_or(f64::INFINITY, f64::from);
             (step.px(f.scale_px_m, f.plane.depth(0.0, 0.0)) / sigma).powi(2) / 12.0
@@ -227,8 +231,7 @@ pub(in crate::diagnose) fn contradicted(
     fields.iter().for_each(|f| words.merge(&f.words));
     let of = |kind: &Kind| {
         let size = known.parameter(kind.id, kind.parameter)?;
-        let step = Step { is_of_depth: kind.is_of_depth(), size, p: None };
-        let lies = words.on(step, &recording.sensor, fields[0].scale_px_m)?;
+        let lies = words.on(kind.step(size), &recording.sensor, fields[0].scale_px_m)?;
         (!lies).then(|| kind.finding(size, fields)).filter(|f| f.size.sigma > STEP_SHARE)
     };
     KINDS.iter().filter_map(of).collect()

@@ -23,11 +23,12 @@ impl KnownTerms {
         let mut known = KnownTerms::default();
         for effect in &model.effects {
             let mut effect = effect.clone();
-            let formula = Active::from_model(&effect).ok().filter(|_| effect.shape.is_empty());
+            let is_formula = effect.shape.is_empty();
+            let formula = if is_formula { Active::from_model(&effect).ok() } else { None };
             let term = formula.as_ref().and_then(|f| f.effect.term(&f.settings, camera));
-            if let Some(Active { effect: formula, settings }) = &formula {
+            if let Some(Active { effect: catalogue, settings }) = &formula {
                 // What the entry leaves out is typical, as it is simulated and corrected.
-                for (k, parameter) in formula.card().parameters.iter().enumerate() {
+                for (k, parameter) in catalogue.card().parameters.iter().enumerate() {
                     let stated = effect.parameters.entry(parameter.name);
                     stated.or_insert_with(|| settings.at(k).into());
                 }
