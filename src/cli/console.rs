@@ -253,7 +253,12 @@ impl Watch for Stages {
 
 /// Prints the last line of a command: the next command, to copy.
 pub fn next_step(words: &[OsString]) {
-    say(format!("next: kinoise {}", shell(words)));
+    next_command(&format!("kinoise {}", shell(words)));
+}
+
+/// Same of a command as it is typed.
+pub fn next_command(command: &str) {
+    say(format!("next: {command}"));
 }
 
 /// The words quoted for a shell, in one line.

@@ -16,7 +16,8 @@ use kinoise::{Form, NoiseModel, Recording, Seed, Sensor};
 
 use super::common::{Global, Input, say_differences, source_date};
 use super::console::{
-    detail, detail_model, detail_recording, notes, one_line, result_lines, say, working,
+    detail, detail_model, detail_recording, next_command, notes, one_line, result_lines, say,
+    working,
 };
 use super::diagnose_next::After;
 use super::origin::origin;
@@ -99,7 +100,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<u8> {
         input: &held.input,
     };
     after.reproductions(arguments.model.as_deref(), &model.effects).iter().for_each(say);
-    after.steps().iter().take(1).for_each(|step| say(format!("next: {}", step.command)));
+    after.steps().iter().take(1).for_each(|step| next_command(&step.command));
     let found = diagnosis.verdict == Verdict::Mismatch && !arguments.exit_zero;
     Ok(if found { FOUND } else { 0 })
 }

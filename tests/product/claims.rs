@@ -88,6 +88,23 @@ fn a_model_that_has_too_much_of_an_effect_is_contradicted_and_a_true_one_is_not(
     }
 }
 
+/// The model calibrated on a recording.
+fn calibrated(at: &Path, recording: &str) -> Value {
+    run(at, &["calibrate", recording, "-o", "calibrated", "-q"]);
+    let text = std::fs::read(at.join("calibrated/model.json")).expect("a model");
+    serde_json::from_slice(&text).expect("JSON")
+}
+
+/// The model's file with another level of sigma.
+fn with_sigma_times(model: &Value, factor: f64) -> String {
+    let mut changed = model.clone();
+    for name in ["a", "b"] {
+        let value = &mut changed["sigma"]["parameters"][name]["value"];
+        *value = json!(value.as_f64().expect("a number") * factor);
+    }
+    changed.to_string()
+}
+
 /// On few small views, too few for the search: a sigma far too small or too large, and errors of many times
 /// the noise.
 #[test]
@@ -96,16 +113,10 @@ fn a_model_that_is_far_off_is_no_match() {
     let at = folder.path();
     let views = ["--frames", "2", "--distances", "1,1.5,2,3", "--tilts", "0,30"];
     run(at, &[&["simulate", "clean", "--shrink", "8"], &views[..]].concat());
-    run(at, &["calibrate", "clean", "-o", "calibrated", "-q"]);
-    let text = std::fs::read(at.join("calibrated/model.json")).expect("a model");
-    let model: Value = serde_json::from_slice(&text).expect("JSON");
+    let model = calibrated(at, "clean");
     for factor in [0.001, 0.01, 0.02, 0.05, 20.0, 1000.0] {
-        let mut changed = model.clone();
-        for name in ["a", "b"] {
-            let value = &mut changed["sigma"]["parameters"][name]["value"];
-            *value = json!(value.as_f64().expect("a number") * factor);
-        }
-        std::fs::write(at.join("calibrated/model.json"), changed.to_string()).expect("written");
+        let changed = with_sigma_times(&model, factor);
+        std::fs::write(at.join("calibrated/model.json"), changed).expect("written");
         let (verdict, _) = told(at, "clean", "vignetting", &json!({"growth": 0.0}));
         assert_eq!(verdict, "mismatch", "sigma times {factor}");
     }
@@ -127,14 +138,8 @@ fn noise_without_a_law_is_a_mismatch_of_the_extended_model_too() {
     let at = folder.path();
     let views = ["--frames", "2", "--distances", "1,1.5,2", "--tilts", "0,30"];
     run(at, &[&["simulate", "first", "--shrink", "8"], &views[..]].concat());
-    run(at, &["calibrate", "first", "-o", "calibrated", "-q"]);
-    let text = std::fs::read(at.join("calibrated/model.json")).expect("a model");
-    let mut model: Value = serde_json::from_slice(&text).expect("JSON");
-    for name in ["a", "b"] {
-        let value = &mut model["sigma"]["parameters"][name]["value"];
-        *value = json!(value.as_f64().expect("a number") * 8.0);
-    }
-    std::fs::write(at.join("noisy.json"), model.to_string()).expect("written");
+    let noisy = with_sigma_times(&calibrated(at, "first"), 8.0);
+    std::fs::write(at.join("noisy.json"), noisy).expect("written");
     run(at, &[&["simulate", "calm", "-m", "calibrated/model.json"], &views[..]].concat());
     run(at, &[&["simulate", "noisy", "-m", "noisy.json"], &views[..]].concat());
     for view in ["0000", "0003"] {

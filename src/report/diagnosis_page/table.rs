@@ -85,16 +85,13 @@ pub(super) fn advice(f: &Finding) -> String {
         (Status::Named, _) if f.effect == Some("target-motion") => "keep the target still",
         (Status::Named, _) => "nothing: the extended model has it",
         (Status::OneOf, None) if f.is_law() => "measure near and far in turn, from a cold start",
-        (Status::OneOf, None) => "add views at other distances and tilts",
         (Status::Unexplained, None) => "vary one condition at a time to find its cause",
         (Status::Recalibrate, _) => "run `kinoise calibrate` again",
-        (Status::NotIdentifiable, _) if f.statistic != Statistic::Bias => {
-            "add views at other distances and tilts"
-        }
-        (Status::NotIdentifiable, _) => {
+        (Status::NotIdentifiable, _) if f.statistic == Statistic::Bias => {
             "measure the distance from sensor to target with a tape in a few views at different distances, write it into \
              each view's view.json as “reference_distance_m”, and diagnose again"
         }
+        (Status::OneOf | Status::NotIdentifiable, _) => "add views at other distances and tilts",
     };
     words.into()
 }
