@@ -94,7 +94,7 @@ fn seen(world: World<'_>, plan: &Plan) -> (Vec<f32>, Vec<f32>) {
         let Some(site) = eye.look(u, v).filter(|s| s.on_board) else { continue };
         let sum = Sum::of(world.causes, &site, plan);
         let z = fb / (site.disparity + sum.error);
-        let own = sum.spread * world.unit.sigma(site.z, site.theta);
+        let own = sum.stretch(&site) * world.unit.sigma(site.z, site.theta);
         depth[i] = (z * sum.gain - cut) as f32;
         sigma[i] = (sum.gain * own.hypot(z * z * slope * tremble)) as f32;
     }

@@ -40,6 +40,11 @@ impl Sum {
         }
         sum
     }
+
+    /// Factor on the noise of the depth. The matcher's noise is one of the disparity: a shift carries it along.
+    pub fn stretch(&self, site: &Site) -> f64 {
+        self.spread * (site.disparity / (site.disparity + self.error)).powi(2)
+    }
 }
 
 /// Change of inverse depth per pixel along the slope, 1/m.
@@ -211,7 +216,7 @@ fn pixel(set: &Set, site: &Site, plan: &Plan, rounding: f64) -> Pixel {
     Pixel {
         disparity: (site.disparity + sum.error) as f32,
         // The calibrated sigma already includes the rounding of the stored number.
-        sigma: (sum.spread * (base * base - rounding).max(0.0).sqrt()) as f32,
+        sigma: (sum.stretch(site) * (base * base - rounding).max(0.0).sqrt()) as f32,
         gain: sum.gain as f32,
         loss: (1.0 - sum.answer) as f32,
         on_board: site.on_board,
