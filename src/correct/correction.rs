@@ -8,6 +8,7 @@ use crate::camera::{Camera, Rays};
 use crate::effects::{Active, Inverse};
 use crate::error::Result;
 use crate::model::{self, NoiseModel, SigmaModel};
+use crate::sequence::{Moment, Sequence};
 use crate::stats::bisect;
 use crate::terms::{ANYWHERE, LearntTerm, Needs, Pixels, Statistic, Term};
 use crate::view::Sensor;
@@ -24,6 +25,13 @@ pub struct Conditions {
 }
 
 impl Conditions {
+    /// Conditions of a frame of a film.
+    pub fn of(moment: &Moment, sequence: &Sequence) -> Self {
+        let begin = sequence.moments.first().map_or(0.0, |m| m.stamp);
+        let (session_s, temperature_c) = (moment.stamp - begin, sequence.temperature_c);
+        Conditions { session_s, temperature_c, ..Conditions::default() }
+    }
+
     /// Whether `term` can be evaluated: a curve over temperature needs a measured temperature.
     pub(super) fn determine(&self, term: &Term) -> bool {
         self.temperature_c.is_some() || !term.needs().temperature
@@ -142,11 +150,21 @@ impl Correction {
         (both != ANYWHERE).then_some(both)
     }
 
-    /// Remarks on this combination of model and sensor, and on what sigma lacks without a temperature.
-    pub(super) fn remarks_on_sigma(&self) -> Vec<String> {
+    /// Remark on frames without a temperature, if a bias needs one.
+    pub(crate) fn remark_without_temperature(&self, place: &str) -> Option<String> {
+        self.needs.temperature.then(|| {
+            format!(
+                "{place}: the model's bias over temperature stays in, because the temperature is unknown; a view.json gives it as temperature_c, a bag in a topic of sensor_msgs/Temperature"
+            )
+        })
+    }
+
+    /// Remarks on this combination of model and sensor, and on what sigma lacks, also for want of a
+    /// temperature.
+    pub(super) fn remarks_on_sigma(&self, conditions: &Conditions) -> Vec<String> {
         let mut remarks = self.remarks.clone();
         remarks.extend(self.unpredicted.iter().map(|id| format!("sigma lacks the model's {id}")));
-        let of_temperature = |(t, _): &LearntTerm| !Conditions::default().determine(t);
+        let of_temperature = |(t, _): &LearntTerm| !conditions.determine(t);
         if self.variance.iter().any(of_temperature) {
             remarks.push(
                 "sigma lacks what the model says of the temperature, which is unknown".into(),

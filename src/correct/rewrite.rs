@@ -18,6 +18,7 @@ use crate::io::{
     read_list, write_atomic,
 };
 use crate::read::read_image;
+use crate::units::counted;
 use crate::view::{FrameRef, Recording, Sensor};
 
 /// Result of correcting a recording.
@@ -151,7 +152,12 @@ impl Rewrite<'_> {
         // The first error in frame order, not the first that a thread meets.
         let tallies: Vec<Result<Tally>> = images.par_iter().map(each).collect();
         let tallies = tallies.into_iter().collect::<Result<Vec<_>>>()?;
-        let corrected = self.sum(&tallies, recording)?;
+        let mut corrected = self.sum(&tallies, recording)?;
+        let cold = images.iter().filter(|i| i.conditions.temperature_c.is_none()).count();
+        if cold > 0 {
+            let place = format!("{cold} of {}", counted(images.len(), "frame"));
+            corrected.remarks.extend(self.correction.remark_without_temperature(&place));
+        }
         copy(self.root, self.output, &last)?;
         // A dump that keeps its code remains a dump; fakenect's readers know no other description.
         let assumed = self.layout != Layout::Dump && !self.root.join(DESCRIPTION).is_file();

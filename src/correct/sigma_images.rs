@@ -47,14 +47,11 @@ pub fn sigma_images(
     let folder = output.join("sigma");
     std::fs::create_dir_all(&folder).map_err(|e| Error::write(&folder, e))?;
     let names = names(&sequence.moments);
-    let begin = sequence.moments.first().map_or(0.0, |m| m.stamp);
     let done = AtomicUsize::new(0);
     let [near, far] = model.sigma.domain.z_m;
     let one = |(moment, name): (&Moment, &String)| -> Result<SigmaImages> {
         let depth = table.depths(&sequence.depth(moment)?);
-        let session_s = moment.stamp - begin;
-        let conditions = Conditions { session_s, ..Conditions::default() };
-        let sigma = correction.sigma_m(&depth, &conditions)?;
+        let sigma = correction.sigma_m(&depth, &Conditions::of(moment, sequence))?;
         let mut found = SigmaImages { frames: 1, ..SigmaImages::default() };
         for (z, sigma) in depth.iter().zip(&sigma).filter(|(_, s)| s.is_finite()) {
             found.measured += 1;
@@ -89,7 +86,9 @@ pub fn sigma_images(
     write_json(&output.join("sigma.json"), &about, "report this as a bug")?;
     let mut sum = all.into_iter().fold(SigmaImages::default(), SigmaImages::and);
     sum.mean_m /= sum.measured.max(1) as f64;
-    sum.remarks = correction.remarks_on_sigma();
+    let first = sequence.moments.first();
+    let conditions = first.map_or_else(Conditions::default, |m| Conditions::of(m, sequence));
+    sum.remarks = correction.remarks_on_sigma(&conditions);
     Ok(sum)
 }
 

@@ -107,7 +107,8 @@ pub fn map(
         ready = next;
         progress.step(frames.len(), moments.len());
     }
-    let mut remarks: Vec<String> = frames.iter().filter_map(|f| f.remark.clone()).collect();
+    let mut remarks: Vec<String> = preprocessor.remark().into_iter().collect();
+    remarks.extend(frames.iter().filter_map(|f| f.remark.clone()));
     remarks.extend(frame_report::remarks(&frames));
     let mut mapped = Mapped { frames, map: tracker.into_map(), remarks };
     let offset = mapped.clock_offset().filter(ClockOffset::is_significant);

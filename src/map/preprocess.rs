@@ -64,7 +64,6 @@ pub struct Preprocessor<'a> {
     correction: Correction,
     table: DepthTable,
     rays: Rays,
-    begin: f64,
 }
 
 impl<'a> Preprocessor<'a> {
@@ -77,8 +76,14 @@ impl<'a> Preprocessor<'a> {
             correction: Correction::of(model, &sequence.sensor)?,
             table: sequence.sensor.code.table(),
             rays: sequence.sensor.camera.rays(),
-            begin: sequence.moments.first().map_or(0.0, |m| m.stamp),
         })
+    }
+
+    /// Remark on what the model needs to know about this film and is not told.
+    pub fn remark(&self) -> Option<String> {
+        let place = self.sequence.root.display().to_string();
+        let missing = self.sequence.temperature_c.is_none();
+        missing.then(|| self.correction.remark_without_temperature(&place)).flatten()
     }
 
     /// Reads and prepares a frame. Fails when the depth image cannot be read, or OpenCV fails.
@@ -107,9 +112,7 @@ impl<'a> Preprocessor<'a> {
     /// Depth, m, with the sensor's biases corrected.
     fn corrected(&self, raw: &Frame, moment: &Moment) -> Result<Vec<f32>> {
         let mut depth = self.table.depths(raw);
-        let session_s = moment.stamp - self.begin;
-        let conditions = Conditions { session_s, ..Conditions::default() };
-        self.correction.apply(&mut depth, &conditions)?;
+        self.correction.apply(&mut depth, &Conditions::of(moment, self.sequence))?;
         Ok(depth)
     }
 

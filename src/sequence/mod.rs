@@ -58,6 +58,8 @@ pub struct Moment {
 pub struct Sequence {
     pub root: PathBuf,
     pub sensor: Sensor,
+    /// Mean over the film, degrees Celsius, where a bag tells it.
+    pub temperature_c: Option<f64>,
     /// In time order; no two have the same stamp.
     pub moments: Vec<Moment>,
     /// True poses, in time order; empty where there are none.

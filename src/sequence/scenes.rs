@@ -68,7 +68,15 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     let sensor = assumed.sensor("7-Scenes Kinect", size, INTRINSICS, CODE)?;
     let frames: Vec<&FrameRef> = moments.iter().map(|m| &m.depth).collect();
     remarks.extend(refuse_impossible(root, &sensor, &frames)?);
-    Ok(Sequence { root: root.to_path_buf(), sensor, moments, truth, unused_truth: None, remarks })
+    Ok(Sequence {
+        root: root.to_path_buf(),
+        sensor,
+        temperature_c: None,
+        moments,
+        truth,
+        unused_truth: None,
+        remarks,
+    })
 }
 
 /// Reads a 4 x 4 matrix, `world_from_camera`; `None` if tracking had failed (not finite).

@@ -24,6 +24,8 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     }
     let recording = open_uncut(root, assumed)?;
     let mut remarks = recording.remarks;
+    // A film that is not cut is one view.
+    let temperature_c = recording.views.first().and_then(|v| v.notes.temperature_c);
     let depth = recording.views.into_iter().flat_map(|v| v.depth).collect();
     let moments = with_colour(root, depth, &mut remarks)?;
     let truth = root.join("groundtruth.txt");
@@ -37,7 +39,8 @@ pub(super) fn open(root: &Path, assumed: &Assumed) -> Result<Sequence> {
     };
     remarks.extend(unused_truth.iter().map(|why| format!("the ground truth is not used: {why}")));
     let root = root.to_path_buf();
-    Ok(Sequence { root, sensor: recording.sensor, moments, truth, unused_truth, remarks })
+    let sensor = recording.sensor;
+    Ok(Sequence { root, sensor, temperature_c, moments, truth, unused_truth, remarks })
 }
 
 fn no_sequence(root: &Path) -> Error {
