@@ -73,10 +73,10 @@ struct Tuning {
         ("tukey", "Not at all, when far out", Kernel::Tukey),
     ]))]
     kernel: Option<Kernel>,
-    /// Side of a voxel in m
+    /// Side of a voxel in m, with --method paper
     #[arg(long, value_name = "M", value_parser = between(VOXEL_M[0], VOXEL_M[1], "m"))]
     voxel: Option<f64>,
-    /// Side of an image block in px
+    /// Side of an image block in px, not with --method paper
     #[arg(long, value_name = "PX", value_parser = count(1, MAX_BLOCK_PX))]
     block: Option<usize>,
     /// Greatest distance between the points of a pair, m. With the default method, once the motion is
@@ -86,12 +86,12 @@ struct Tuning {
     /// Maximum number of iterations of an alignment
     #[arg(long, value_name = "N", value_parser = count(1, MAX_ITERATIONS))]
     iterations: Option<usize>,
-    /// Maximum number of observations that count for a piece of the map; fewer do where frames fit it
+    /// Maximum number of observations that count for a piece of the map, with --method model; fewer do where frames fit it
     /// worse than the noise model expects
     #[arg(long, value_name = "N", value_parser = between(1.0, MAX_OBSERVATIONS.into(), "observations"))]
     memory: Option<f64>,
     /// Time from the first row of a depth image to the last, for a rolling shutter, s (a Kinect v1 takes
-    /// about 0.03) [default: 0, all rows at once]
+    /// about 0.03), not with --method paper [default: 0, all rows at once]
     #[arg(long, value_name = "S", value_parser = between(0.0, MAX_READOUT_S, "s"))]
     readout: Option<f64>,
     /// Do not read colour for the map
@@ -103,6 +103,23 @@ struct Tuning {
 type Method = fn() -> Options;
 
 impl Tuning {
+    /// Notes options that this method does not use.
+    fn note_unused(&self) {
+        let method = (self.method)().method;
+        let (voxels, model) = (method == map::Method::Paper, method == map::Method::Model);
+        let both = "projective or model";
+        for (option, unused, of) in [
+            ("--voxel", self.voxel.is_some() && !voxels, "paper"),
+            ("--block", self.block.is_some() && voxels, both),
+            ("--readout", self.readout.is_some() && voxels, both),
+            ("--memory", self.memory.is_some() && !model, "model"),
+        ] {
+            if unused {
+                say(format!("note: {option} has no effect here: it belongs to --method {of}"));
+            }
+        }
+    }
+
     fn options(&self, seed: Seed) -> Options {
         let options = (self.method)();
         Options {
@@ -127,6 +144,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
     let thinning = &arguments.thinning;
     sequence.thin(thinning.stride, thinning.frames);
     let options = arguments.tuning.options(global.seed());
+    arguments.tuning.note_unused();
     notes(&sequence.remarks);
     let model = arguments.model.read_for(&sequence)?;
     let title = format!("Map of {}", sequence.name());

@@ -7,9 +7,11 @@ use assert_cmd::Command;
 use kinoise::evaluate::{Delta, evaluate};
 use kinoise::io::Assumed;
 use kinoise::map::{Init, Mapped, Method, Options, Weights, map};
+use kinoise::model::{Effect, UNEXPLAINED};
 use kinoise::sequence::{Sequence, open};
 use kinoise::simulate::Physics;
 use kinoise::simulate::room::{Film, Pose, Room, around_the_desks};
+use kinoise::terms::{Basis, Coordinate, Modulation, Term};
 use kinoise::{NoiseModel, Seed, SigmaModel};
 use nalgebra::Isometry3;
 
@@ -142,6 +144,45 @@ fn a_damaged_image_is_told_and_passed_over() {
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("lost in 1 of 10") && said.contains("damaged"), "{said}");
     assert_eq!(poses_in(&out), 9);
+}
+
+#[test]
+fn an_option_that_the_method_does_not_use_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = film(dir.path(), some(3));
+    let told = |more: &[&str]| {
+        let (code, said, _) = map_folder(&folder, more);
+        assert_eq!(code, 0, "{said}");
+        ["--voxel", "--block", "--memory"].map(|o| said.contains(&format!("{o} has no effect")))
+    };
+    let all = ["--memory", "5", "--voxel", "0.03", "--method"];
+    for (method, unused) in [
+        ("paper", [false, true, true]),
+        ("projective", [true, false, true]),
+        ("model", [true, false, false]),
+    ] {
+        assert_eq!(told(&[&all[..], &[method]].concat()), unused, "{method}");
+    }
+}
+
+/// A curve over the temperature shifts the map where the film tells its temperature, and is told elsewhere.
+#[test]
+fn a_bias_over_the_temperature_needs_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut sequence = open(&film(dir.path(), some(3)), &Assumed::default()).unwrap();
+    let (over, times) = (Coordinate::Temperature, Modulation::One);
+    let curve = Basis::Curve { over, low: 20.0, high: 40.0, nodes: 2, times };
+    let shape = vec![Term::bias(curve, vec![0.05, 0.1])];
+    let warm = Effect { id: UNEXPLAINED.into(), shape, ..Effect::default() };
+    let model = NoiseModel { effects: vec![warm], ..NoiseModel::paper() };
+    let map_of = |sequence: &Sequence| map(sequence, &model, &best(), &|_, _| ()).unwrap();
+    let cold = map_of(&sequence);
+    assert!(cold.remarks.iter().any(|r| r.contains("the temperature is unknown")));
+    assert_eq!(cold.map, mapped(&sequence, &best()).map);
+    sequence.temperature_c = Some(30.0);
+    let warm = map_of(&sequence);
+    assert!(!warm.remarks.iter().any(|r| r.contains("temperature")), "{:?}", warm.remarks);
+    assert_ne!(warm.map, cold.map);
 }
 
 #[test]
