@@ -104,7 +104,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<()> {
         let sensor = sensor.unwrap_or_else(tum);
         let room = Room::office(global.seed());
         let poses = arguments.room.path(&room, arguments.frames)?;
-        refuse_of_target(&physics)?;
+        refuse_of_target(&physics, given)?;
         let film = Film { sensor, room, poses, physics, seed: global.seed() };
         write_film(&film, arguments.folder(global)?)?
     } else {
@@ -203,6 +203,11 @@ fn plans(
     let recording = open(like, &arguments.input.assumed()?)?;
     let (plans, excluded) = plan_like(&recording, scenery.reference_error_m.unwrap_or(0.0), seed);
     notes(&excluded);
+    let referenced = recording.views.iter().any(|v| v.notes.reference_distance_m.is_some());
+    if scenery.reference_error_m.is_some() && !referenced {
+        let what = "no view has a reference_distance_m to write again";
+        say(format!("note: --reference-error has no effect: in {} {what}", like.display()));
+    }
     ensure!(!plans.is_empty(), "{}: no view shows a plane; see the notes", like.display());
     Ok((plans, Some(recording.sensor)))
 }

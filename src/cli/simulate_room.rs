@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
+use kinoise::effects::Active;
 use kinoise::simulate::Physics;
 use kinoise::simulate::room::{
     CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
@@ -78,14 +79,32 @@ fn fitted(
     Ok(poses)
 }
 
-/// Refuses causes of the target: a room has none that could be bent or move.
-pub fn refuse_of_target(physics: &Physics) -> anyhow::Result<()> {
-    let Physics::Speckle { causes } = physics else { return Ok(()) };
-    let of_target = [("bow_m", causes.bow_m), ("motion_mps", causes.motion_mps)];
-    match of_target.into_iter().find(|(_, value)| *value != 0.0) {
-        Some((name, _)) => {
-            bail!("--cause {name}: a room has no target; leave it out, or leave --room out")
+/// Refuses causes and `given` effects of the target: a room has none that could be bent or move. Those that
+/// the model brings are noted.
+pub fn refuse_of_target(physics: &Physics, given: &[Active]) -> anyhow::Result<()> {
+    let option = match physics {
+        Physics::Speckle { causes } => {
+            let of_target = [("bow_m", causes.bow_m), ("motion_mps", causes.motion_mps)];
+            of_target.iter().find(|(_, v)| *v != 0.0).map(|(name, _)| format!("--cause {name}"))
         }
+        Physics::Formula { effects, .. } => {
+            let given = of_target(given).next().map(|id| format!("--effect {id}"));
+            if given.is_none() {
+                of_target(effects).for_each(|id| {
+                    say(format!("note: the model's {id} is left out: a room has no target"));
+                });
+            }
+            given
+        }
+    };
+    match option {
+        Some(option) => bail!("{option}: a room has no target; leave it out, or leave --room out"),
         None => Ok(()),
     }
+}
+
+/// Ids of the effects that act on a target alone.
+fn of_target(effects: &[Active]) -> impl Iterator<Item = &'static str> {
+    let act = effects.iter().filter(|a| !a.is_identity()).map(|a| a.effect.card().id);
+    act.filter(|id| matches!(*id, "target-bow" | "target-motion"))
 }

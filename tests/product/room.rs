@@ -528,6 +528,7 @@ fn options_of_a_bench_are_refused_in_a_room() {
         &["--infrared"],
         &["--board", "1,1"],
         &["--physics", "speckle", "--cause", "bow_m=0.01"],
+        &["--effect", "target-bow:sagitta_m=0.01"],
     ] {
         let mut command = common::kinoise();
         command.args(["simulate", "never-written", "--room"]).args(extra).assert().code(2);

@@ -94,3 +94,35 @@ fn a_twin_has_reference_distances_of_its_own_planes() {
         assert_eq!(view.notes.reference_distance_m, Some(own), "{}", view.name);
     }
 }
+
+/// The layout refuses an uncertainty that is not below its distance: a twin drops both rather than one, and a
+/// recording without references has none to write again.
+#[test]
+fn a_twin_has_a_distance_above_its_uncertainty_or_neither() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let simulated = |arguments: &str| {
+        let mut command = common::kinoise();
+        command.current_dir(folder.path()).arg("simulate").args(arguments.split(' '));
+        let done = command.output().expect("started");
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(done.status.success(), "{said}");
+        said
+    };
+    simulated("wall --wall-target --distances 1 --tilts 0 --shrink 4");
+    let said = simulated("again --like wall --reference-error 0.01");
+    assert!(said.contains("--reference-error has no effect"), "{said}");
+    let mut recording = open(&folder.path().join("wall"), &Assumed::default()).expect("opens");
+    let notes = &mut recording.views[0].notes;
+    (notes.reference_distance_m, notes.reference_uncertainty_m) = (Some(1.0), Some(0.9));
+    let kept = (0..20).filter(|&seed| {
+        let (views, _) = plan_like(&recording, 1.0, Seed(seed));
+        let notes = &views[0].notes;
+        let [distance, uncertainty] = [notes.reference_distance_m, notes.reference_uncertainty_m];
+        assert_eq!(distance.is_some(), uncertainty.is_some(), "seed {seed}");
+        assert!(distance.is_none_or(|d| d > 0.9), "seed {seed}: {distance:?}");
+        distance.is_some()
+    });
+    // Half of the readings of 1 m, off by a metre, are above 0.9 m.
+    let kept = kept.count();
+    assert!((1..20).contains(&kept), "{kept} of 20");
+}
