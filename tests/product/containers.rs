@@ -6,7 +6,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use kinoise::correct::{CorrectOptions, correct_recording};
+use kinoise::correct::{Conditions, CorrectOptions, correct_recording};
 use kinoise::io::{Assumed, FrameSource, open, open_uncut, write_recording_file};
 use kinoise::model::Effect;
 use kinoise::view::{FrameRef, RecordingFile};
@@ -146,6 +146,12 @@ fn bags_tell_the_temperature_of_a_view() {
     let celsius: Vec<f64> = recording.views.iter().filter_map(|v| v.notes.temperature_c).collect();
     // One reading per view, at its fifth frame.
     assert_eq!(celsius, [30.4, 31.4, 32.4, 33.4]);
+    let film = sequence::open(&container("film.bag"), &Assumed::default()).expect("a bag");
+    let mean = film.temperature_c.expect("a temperature");
+    assert!((mean - 31.9).abs() < 1e-9, "{mean}");
+    let conditions = Conditions::of(&film.moments[3], &film);
+    assert_eq!(conditions.temperature_c, film.temperature_c);
+    assert_eq!(conditions.session_s, film.moments[3].stamp - film.moments[0].stamp);
 }
 
 #[test]
@@ -472,6 +478,35 @@ fn lengths_that_lie_are_not_believed() {
 }
 
 /// The claimed length of a text must not decide how much memory is allocated.
+/// Floats would otherwise be read as words, two to a pixel.
+#[test]
+fn a_topic_that_changes_its_encoding_is_refused() {
+    let whole = fs::read(container("realsense.bag")).expect("a bag");
+    let changed = replaced(&whole, b"mono16", 1, b" 32FC1");
+    let said = refused("realsense.bag", &changed, &Assumed::default());
+    assert!(said.contains("message 2 of /device_0/sensor_0/Depth_0/image/data is"), "{said}");
+    assert!(said.contains("32FC1") && said.contains("a bag of their own"), "{said}");
+}
+
+/// A folder that describes itself is no folder of rosbag2, whatever a bag and a metadata.yaml do in it; and
+/// one of rosbag2 is read whatever its metadata.yaml says.
+#[test]
+fn a_foreign_metadata_file_makes_no_bag_of_a_folder() {
+    let frames_in =
+        |path: &Path| frames(&open_uncut(path, &Assumed::default()).expect("a recording"));
+    let folder = folder();
+    let plain = frames_in(folder.path());
+    let beside = |folder: &Path, bag: &str| {
+        fs::copy(container(bag), folder.join(bag)).expect("copied");
+        fs::write(folder.join("metadata.yaml"), "of: something else\n").expect("written");
+    };
+    beside(folder.path(), "unchunked.mcap");
+    assert!(frames_in(folder.path()) == plain);
+    let of_bag = tempfile::tempdir().expect("a temporary folder");
+    beside(of_bag.path(), "film.mcap");
+    assert!(frames_in(of_bag.path()) == plain);
+}
+
 #[test]
 fn the_text_of_an_mcap_record_is_as_long_as_the_record() {
     let whole = fs::read(container("unchunked.mcap")).expect("an MCAP");

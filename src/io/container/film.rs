@@ -143,6 +143,15 @@ impl Survey {
         let message = bag.message(topic, number, HEAD_BYTES)?;
         let dialect = bag.topics()[topic].dialect;
         let head = ImageHead::read(&message.bytes, dialect, encoding.is_raw).map_err(damage)?;
+        if Encoding::of(&head.encoding, encoding.is_raw) != Some(encoding) {
+            let what = format!(
+                "{} is \"{}\", which the first message is not",
+                place(bag, topic, number),
+                head.encoding
+            );
+            let remedy = "a topic has one encoding: keep the messages before, or those from there on, in a bag of their own";
+            return Err(Error::recording(bag.path(), what, remedy));
+        }
         match encoding.fault(&head, message.length) {
             Some(fault) => Err(damage(fault)),
             None => Ok((head.stamp_ns, head.size)),
