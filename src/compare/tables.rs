@@ -133,7 +133,7 @@ pub fn json(comparison: &Comparison) -> Value {
             "of_the_paper": r.variant.of_the_paper,
             "settings": format!("{:?}", r.variant.options),
             "runs": r.runs.iter().map(run).collect::<Vec<Value>>(),
-            "failed": r.failed.last(),
+            "failed": r.failed,
         })
     };
     json!({
@@ -151,4 +151,41 @@ fn evaluation(e: &Evaluation) -> Map<String, Value> {
         ("rpe_rotation_rad", e.rpe.rotation.json("")),
     ];
     figures.map(|(name, value)| (name.to_string(), value)).into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::compare::of_the_paper;
+    use crate::evaluate::{Delta, evaluate};
+    use crate::map::Stages;
+    use crate::trajectory::Pose;
+
+    #[test]
+    fn the_table_counts_the_failures_and_the_json_has_them_all() {
+        let at = |k: u8| {
+            let t = f64::from(k);
+            Pose { stamp: t, world_from_camera: Isometry3::translation(t, t * t, 0.0) }
+        };
+        let truth: Vec<Pose> = (0..5).map(at).collect();
+        let still = evaluate(&truth, &truth, Delta::Seconds(1.0)).expect("evaluated");
+        let run = Run {
+            seed: 1,
+            evaluation: still.clone(),
+            iterations: 3.0,
+            lost: 0,
+            frames: truth.len(),
+            stages: Stages::default(),
+            trajectory: truth.clone(),
+        };
+        let failed = ["a.png: cut", "b.png: cut"].map(String::from).to_vec();
+        let row = Row { variant: of_the_paper()[2], runs: vec![run], failed: failed.clone() };
+        let rows = vec![row];
+        let all = Comparison { sequence: "desk".into(), rows, still, truth, remarks: Vec::new() };
+        let text = text(&all);
+        assert_eq!(text.matches("2 failed, the last: b.png: cut").count(), TABLES.len(), "{text}");
+        assert_eq!(json(&all)["rows"][0]["failed"], json!(failed));
+    }
 }
