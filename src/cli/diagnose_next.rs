@@ -64,7 +64,7 @@ impl After<'_> {
     /// Whether there is a bias to correct that held-out views do not contradict, or one that their score does not
     /// hold: a law of the distance, or steps of columns.
     fn corrects(&self) -> bool {
-        let biased = |f: &Finding| f.terms.iter().any(|t| t.is_sensor_bias());
+        let biased = |f: &Finding| f.terms.iter().any(|t| t.is_correctable());
         let gains = self.diagnosis.heldout.as_ref().is_none_or(|h| h.bias_is_clear);
         let findings = &self.diagnosis.findings;
         let unscored = |f: &Finding| f.status == Status::Named && f.is_corrected() && !biased(f);

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::effects::Active;
+use crate::camera::Camera;
+use crate::effects::{self, Active, Effect, Settings};
 use crate::model::Covariance;
 use crate::terms::{Axis, Statistic, Term};
 
@@ -124,12 +125,27 @@ impl Finding {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
     }
 
-    /// Whether `correct` takes it out of depth images: a bias of the sensor, a law of the distance, or the steps of
-    /// columns.
+    /// Whether `correct` takes it out of depth images: the model holds terms that can be subtracted, or a
+    /// formula that can be inverted.
     pub fn is_corrected(&self) -> bool {
-        let steps = self.effect == Some("column-banding") && !self.parameters.is_empty();
-        let law = self.is_law() && self.contradicted.is_none();
-        self.terms.iter().any(Term::is_sensor_bias) || law || steps
+        let held = self.of_some.is_none() && self.contradicted.is_none();
+        held && match &self.terms[..] {
+            [] => self.has_inverse() && self.has_strength(),
+            terms => terms.iter().any(Term::is_correctable),
+        }
+    }
+
+    fn has_inverse(&self) -> bool {
+        let any = Camera::centred(640, 480, 585.0);
+        let inverse = |e: &dyn Effect| e.inverse(&Settings::typical(e.card()), &any);
+        self.effect.and_then(effects::find).and_then(inverse).is_some()
+    }
+
+    /// Whether the strength of its effect was measured; the model holds an effect without one by its name alone.
+    pub fn has_strength(&self) -> bool {
+        let card = self.effect.and_then(effects::find).map(|e| e.card());
+        let strength = card.and_then(|c| c.parameters.first());
+        strength.is_none_or(|p| self.value(p.name).is_some())
     }
 
     /// Text on how many views have it, where not all do.

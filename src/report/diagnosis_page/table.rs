@@ -83,6 +83,12 @@ pub(super) fn advice(f: &Finding) -> String {
         (Status::Named, _) if is_of_target(f) => "use a flatter target: the sensor is right",
         (Status::Named, _) if f.is_corrected() => "`kinoise correct` takes it out",
         (Status::Named, _) if f.effect == Some("target-motion") => "keep the target still",
+        (Status::Named, _) if f.of_some.is_some() => {
+            "find what these views have in common: the extended model, which is of all views, leaves it out"
+        }
+        (Status::Named, _) if f.terms.is_empty() && !f.has_strength() => {
+            "nothing yet: its strength was not measured, and the extended model holds its name alone"
+        }
         (Status::Named, _) => "nothing: the extended model has it",
         (Status::OneOf, None) if f.is_law() => "measure near and far in turn, from a cold start",
         (Status::Unexplained, None) => "vary one condition at a time to find its cause",

@@ -309,6 +309,29 @@ fn odd_numbers_do_not_break_a_page() {
     assert!(rendered(&diagnosis, torn).is_err());
 }
 
+/// Only what the model holds, and `correct` can undo, is said to be taken out or to be in the model.
+#[test]
+fn what_to_do_about_a_cause_is_what_the_model_can() {
+    let told = |effect, parameters: Value| {
+        let parameters = map(parameters);
+        table::advice(&Finding { parameters, ..finding(Status::Named, Some(effect)) })
+    };
+    let measured = |name: &str| json!({name: {"value": 0.1, "std_error": 0.01}});
+    let corrected = "`kinoise correct` takes it out";
+    assert_eq!(told("column-banding", measured("amplitude_px")), corrected);
+    assert_eq!(told("pixel-locking", measured("amplitude_px")), corrected);
+    assert_eq!(told("thermal-drift", measured("relative")), corrected);
+    assert!(told("thermal-drift", json!({})).contains("strength was not measured"));
+    assert!(told("frame-jitter", json!({})).contains("strength was not measured"));
+    let jitter = finding(Status::Named, Some("row-noise"));
+    let some = Finding { of_some: Some([5, 20]), ..jitter };
+    assert!(table::advice(&some).contains("leaves it out"));
+    // A bias over the light can be simulated; depth images alone do not tell it.
+    let light = Term::bias(Basis::powers(Coordinate::Light, 1, Modulation::One), vec![0.1]);
+    let lit = Finding { terms: vec![light], ..finding(Status::Named, Some("vignetting")) };
+    assert_eq!(table::advice(&lit), "nothing: the extended model has it");
+}
+
 /// The number of views is told once, for findings with and without a name.
 #[test]
 fn what_some_views_have_is_told_of_those() {
