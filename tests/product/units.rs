@@ -283,6 +283,20 @@ fn a_bias_of_ones_own_is_told_from_the_common_one() {
     assert!(far.units[2].departure_rms_m > 3.0 * far.units[0].departure_rms_m, "{far:?}");
 }
 
+/// A constant of the disparity is another plane: what the projection leaves of it is rounding, which has
+/// neither a size nor an error to compare.
+#[test]
+fn a_constant_that_no_plane_shows_is_not_compared() {
+    let constant = |px: f64| Effect {
+        shape: vec![Term::bias(Basis::Level, vec![px])],
+        covariance: Some(Covariance { fit: 1, factors: Vec::new(), variances: vec![4e-4] }),
+        ..bias(0.0, 0.02, 1)
+    };
+    let then = with_bias("a", "2026-01-01", constant(0.1), 9);
+    let now = with_bias("a", "2026-06-01", constant(0.5), 10);
+    assert_eq!(compare(&[then, now]).expect("compared").changes[0].bias, None);
+}
+
 /// Writes a model with one change.
 fn write(folder: &Path, name: &str, unit: &UnitModel, change: impl Fn(&mut Value)) -> PathBuf {
     let mut value: Value =

@@ -4,9 +4,12 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::camera::Camera;
 use crate::diagnose::distance::reference::findings;
+use crate::diagnose::joint::anchor::families;
 use crate::diagnose::views::known::KnownTerms;
 use crate::rng::{Seed, Stream};
+use crate::terms::{Basis, Coordinate, Modulation, Term};
 
 const PX_M: f64 = 43.5;
 /// Standard error of a reference, m.
@@ -74,6 +77,25 @@ fn an_offset_keeps_its_size_beside_it() {
             assert_eq!(effect, Some("disparity-offset"));
             assert!((offset_px - 0.06).abs() < tolerance, "seed {seed}: {offset_px}");
         }
+    }
+}
+
+/// A bowl that has an unknown constant takes up an offset of the disparity, but no scale.
+#[test]
+fn beside_an_open_constant_an_offset_is_no_law_and_a_scale_is() {
+    let bowl = Basis::powers(Coordinate::RadiusSquared, 1, Modulation::One);
+    let open = families([Term::bias(bowl, vec![0.2])].iter(), &Camera::centred(160, 120, 145.0));
+    for seed in 0..4 {
+        let mut checked = references(0.06, [0.0; 2], |k| 7 * k % 24, seed);
+        let told = |checked: &[ReferencedView], open: &[Family]| {
+            let laws = laws(checked, 0.0, open);
+            let found = findings(&laws, &KnownTerms::default(), 1.0, 0.003, Seed(1));
+            found.iter().map(|f| f.effect).collect::<Vec<_>>()
+        };
+        assert_eq!(told(&checked, &[]), [Some("disparity-offset")], "seed {seed}");
+        assert_eq!(told(&checked, &open), [], "seed {seed}");
+        checked.iter_mut().for_each(|c| c.off += 0.02 * c.z);
+        assert_eq!(told(&checked, &open), [Some("depth-scale")], "seed {seed}");
     }
 }
 
