@@ -101,10 +101,7 @@ pub(super) fn statistic(statistic: Statistic) -> &'static str {
 /// An interval of an axis in everyday units.
 pub(super) fn interval(axis: Axis, [low, high]: [f64; 2], unit: &str) -> String {
     // What was not measured along an axis has no place on it.
-    if [low, high] == [0.0; 2] {
-        return "not determined".into();
-    }
-    if !(low.is_finite() && high.is_finite()) {
+    if !(low.is_finite() && high.is_finite()) || [low, high] == [0.0; 2] {
         return "over its whole range".into();
     }
     let other = format!(" {unit}");
@@ -193,7 +190,6 @@ mod tests {
             (Axis::SessionTime, [0.0, 1260.0], "s", "0 to 21 min"),
             (Axis::DisparityPhase, [0.0, 0.5], "periods", "0.00 to 0.50 of a step"),
             (Axis::Row, [f64::NEG_INFINITY, 3.0], "px", "over its whole range"),
-            (Axis::Row, [0.0, 0.0], "px", "not determined"),
         ] {
             assert_eq!(interval(at, ends, unit), text);
         }
