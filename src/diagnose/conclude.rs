@@ -16,7 +16,7 @@ use super::finding::next_view;
 use super::finding::outlook::outlook;
 use super::finding::pixels::typical_sigma_mm;
 use super::finding::scene::Scene;
-use super::joint::anchor::{anchor, let_planes_be};
+use super::joint::anchor::{anchor, is_over_distance, let_distances_be, let_planes_be};
 use super::missing::shapes::Step;
 use super::search::outcome::Outcome;
 use super::verdict::{
@@ -173,6 +173,7 @@ impl Case<'_> {
         let camera = &self.sensor().camera;
         let known = KnownTerms::of(extended, camera);
         let added = &mut extended.effects[self.model.effects.len()..];
+        self.let_distances_be(added);
         if self.baseline.is_some() {
             return let_planes_be(added, camera);
         }
@@ -183,6 +184,13 @@ impl Case<'_> {
             anchor(added, &checked, &Scatter::of(&checked).variances, camera);
         } else {
             let_planes_be(added, camera);
+        }
+    }
+
+    /// Makes curves over the distance move these views the least.
+    pub(in crate::diagnose) fn let_distances_be(&self, added: &mut [Effect]) {
+        if added.iter().flat_map(|e| &e.shape).any(|t| is_over_distance(t) && t.is_correctable()) {
+            let_distances_be(added, &self.survey.coarse_mean_data());
         }
     }
 

@@ -15,6 +15,7 @@ use crate::diagnose::views::field::Field;
 use crate::diagnose::views::known::KnownTerms;
 use crate::diagnose::views::learnt::Learnt;
 use crate::effects;
+use crate::model::Effect;
 use crate::rng::Seed;
 use crate::sensors::SensorKind;
 use crate::terms::{Axis, Statistic, Term};
@@ -143,6 +144,9 @@ impl Case<'_> {
         if ours < MIN_VIEWS {
             return Vec::new();
         }
+        let mut all = [Effect { shape: bias.to_vec(), ..Effect::default() }];
+        self.let_distances_be(&mut all);
+        let [Effect { shape: bias, .. }] = &all;
         // Only terms that vanish on the optical axis by their physics show how far the plane bent there.
         let anchored: Vec<Term> =
             bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();

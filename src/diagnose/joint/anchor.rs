@@ -4,14 +4,15 @@
 //! on average over the image. Correcting by it would shift all distances by an unmeasured amount.
 //! Reference distances measure it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::camera::Camera;
 use crate::diagnose::distance::referenced_view::ReferencedView;
+use crate::diagnose::views::samples::ViewData;
 use crate::model::Effect;
 use crate::solve::Cholesky;
 use crate::terms::{
-    Basis, DISPARITY_UNIT_PX, Modulation, PixelContext, Pixels, Term, affine_parts,
+    Basis, Coordinate, DISPARITY_UNIT_PX, Modulation, PixelContext, Pixels, Term, affine_parts,
 };
 
 /// Biases of one power of the disparity, whose constant planes do not determine.
@@ -105,21 +106,60 @@ fn constants(families: &[Family], checked: &[ReferencedView], variances: &[f64])
 pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
     let rays = camera.rays();
     let pixels = Pixels::new(camera, &rays, 1.0);
-    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    subtract(added, |basis| {
+        let Basis::Lens { reference_px, .. } = *basis else { return None };
+        let mean = mean_stretch(basis, reference_px, &pixels)?;
+        Some(mean.into_iter().map(|m| Vector2::new(-reference_px * m, m)).collect())
+    });
+}
+
+/// Whether it is a curve over the distance alone, not a ripple, which has next to no linear part.
+pub fn is_over_distance(term: &Term) -> bool {
+    let basis = &term.basis;
+    basis.alone() == Some(Coordinate::Disparity) && basis.period().is_none()
+}
+
+/// Subtracts from the curves over the distance of `added` what planes absorb: the disparity of a plane is
+/// linear in the picture, so that no view shows a constant or a multiple of it, and a fit leaves them to
+/// chance. What is left moves the samples of the `views` that they were learnt on the least (least squares).
+pub fn let_distances_be(added: &mut [Effect], views: &[ViewData]) {
+    subtract(added, |basis| {
+        let over = Term::bias(basis.clone(), Vec::new());
+        if !is_over_distance(&over) {
+            return None;
+        }
+        let mut products = vec![Vector2::zeros(); basis.count()];
+        let mut square = Matrix2::zeros();
+        for view in views {
+            for (place, &w) in view.places.iter().zip(&view.weight) {
+                let line = Vector2::new(1.0, place.disparity);
+                square += w * line * line.transpose();
+                basis.visit(place, |k, g| products[k] += w * g * line);
+            }
+        }
+        let inverse = square.try_inverse()?;
+        Some(products.into_iter().map(|p| inverse * p).collect())
+    });
+}
+
+/// Subtracts from the shapes of `added` a constant of the disparity, px, and a share of it, for each of their
+/// coefficients: `parts` of their basis, `None` where it has none.
+fn subtract(added: &mut [Effect], parts: impl Fn(&Basis) -> Option<Vec<Vector2<f64>>>) {
     for effect in added {
         let mut first = 0;
         for k in 0..effect.shape.len() {
-            let lens = &effect.shape[k];
-            let span = first..first + lens.coefficients.len();
+            let Term { basis, coefficients, .. } = &effect.shape[k];
+            let span = first..first + coefficients.len();
             first = span.end;
-            let Basis::Lens { reference_px, .. } = lens.basis else { continue };
-            let Some(mean) = mean_stretch(&lens.basis, reference_px, &pixels) else { continue };
-            let stretch = dot(&lens.coefficients, &mean);
-            for (times, share) in [(Modulation::Disparity, -1.0), (Modulation::One, reference_px)] {
-                let constant = lift(effect, times, share * stretch, 0.0);
-                // It has the same error as the lens.
+            let Some(parts) = parts(basis) else { continue };
+            let sum =
+                |of: &[f64]| -> Vector2<f64> { of.iter().zip(&parts).map(|(c, p)| *c * p).sum() };
+            let whole = sum(coefficients);
+            for (j, times) in [Modulation::One, Modulation::Disparity].into_iter().enumerate() {
+                let constant = lift(effect, times, -whole[j], 0.0);
+                // It has the same error as the shape.
                 for factor in effect.covariance.iter_mut().flat_map(|c| &mut c.factors) {
-                    factor[constant] += share * dot(&factor[span.clone()], &mean);
+                    factor[constant] -= sum(&factor[span.clone()])[j];
                 }
             }
         }

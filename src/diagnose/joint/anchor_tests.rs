@@ -119,3 +119,56 @@ fn a_lens_without_references_moves_no_plane() {
     }
     assert!(told.abs() < 0.01 * alone.abs(), "{told} of {alone}");
 }
+
+/// A ripple of the distance that was learnt with a constant and a share of the disparity, which no plane shows:
+/// what is left is the ripple less its own line, and its error has no line either.
+#[test]
+fn a_curve_over_the_distance_moves_the_views_the_least() {
+    let (low, high, nodes) = (10.0, 50.0, 41);
+    let over = Coordinate::Disparity;
+    let basis = Basis::Curve { over, low, high, nodes, times: Modulation::One };
+    let node =
+        |f: &dyn Fn(f64) -> f64| -> Vec<f64> { (0..nodes).map(|k| f(low + k as f64)).collect() };
+    let ripple = |d: f64| 0.02 * (0.9 * d).sin();
+    let learnt = Term::bias(basis, node(&|d| ripple(d) + 1.7 - 0.08 * d));
+    let factor = node(&|d| 0.3 - 0.01 * d);
+    let covariance = Covariance { factors: vec![factor], ..Covariance::default() };
+    let mut added =
+        [Effect { shape: vec![learnt], covariance: Some(covariance), ..Effect::default() }];
+    // Near views weigh more.
+    let view = |d: &f64| {
+        let place =
+            |k: i32| PixelContext { disparity: d + 0.05 * f64::from(k), ..PixelContext::default() };
+        let places: Vec<PixelContext> = (-20..=20).map(place).collect();
+        let n = places.len();
+        let (response, weight) = (vec![0.0; n], vec![d * d; n]);
+        ViewData {
+            places: places.into(),
+            response,
+            weight,
+            nuisance: Vec::new(),
+            precision: Vec::new(),
+            gathered: Vec::new(),
+        }
+    };
+    let views: Vec<ViewData> = [12.0, 17.0, 23.0, 31.0, 38.0, 47.0].iter().map(view).collect();
+    let_distances_be(&mut added, &views);
+    let effect = &added[0];
+    let errors = &effect.covariance.as_ref().unwrap().factors[0];
+    let mut first = 0;
+    let error = |t: &Term| {
+        let span = first..first + t.coefficients.len();
+        first = span.end;
+        Term { coefficients: errors[span].to_vec(), ..t.clone() }
+    };
+    let errors: Vec<Term> = effect.shape.iter().map(error).collect();
+    let (mut sums, mut moved, mut size) = ([0.0; 2], 0.0, 0.0);
+    for (place, w) in views.iter().flat_map(|v| v.places.iter().zip(&v.weight)) {
+        let left = Term::sum(&effect.shape, place);
+        sums = [sums[0] + w * left, sums[1] + w * left * place.disparity];
+        (moved, size) = (moved + w * left * left, size + w * ripple(place.disparity).powi(2));
+        assert!(Term::sum(&errors, place).abs() < 1e-9);
+    }
+    assert!(sums.iter().all(|s| s.abs() < 1e-6 * size.sqrt()), "{sums:?}");
+    assert!(moved <= size && moved > 0.5 * size, "{moved} of {size}");
+}

@@ -40,12 +40,18 @@ const NAME_ADEQUATE: f64 = 0.9;
 /// 4.6 times as much, wrong ones the same and less (three trials, three seeds of another hand).
 const BESIDE_NAMELESS: f64 = 3.0;
 
+/// Share of its gain that a name must bring where each view is predicted from the others: views with one cause
+/// lose a few columns' cost, views with errors of their own have nothing to predict.
+const PREDICTED: f64 = 0.5;
+
 /// A candidate fitted to the views that show it best.
 struct Best {
     /// Gain of a common fit to them, less the cost of choosing them and of the columns, nats.
     gain: f64,
     views: Vec<usize>,
     beta: DVector<f64>,
+    /// Whether they predict one another; a single view predicts nothing.
+    agreed: bool,
 }
 
 /// One candidate's evidence, view by view, divided by the views' dispersion.
@@ -78,7 +84,7 @@ fn best(views: &[Evidence], prior: f64) -> Option<Best> {
         let gain = nats - ln_binomial(n as u64, count as u64) - 0.5 * k as f64;
         if best.as_ref().is_none_or(|b| gain > b.gain) {
             let views = order[..count].iter().map(|o| o.1).collect();
-            best = Some(Best { gain, views, beta });
+            best = Some(Best { gain, views, beta, agreed: false });
         }
     }
     best
@@ -117,7 +123,11 @@ impl<'a> Tried<'a> {
     }
 
     fn best(&self) -> Option<Best> {
-        best(&self.evidence, self.prior)
+        let found = best(&self.evidence, self.prior)?;
+        let mine: Vec<Evidence> = found.views.iter().map(|&v| self.evidence[v].clone()).collect();
+        let whole: f64 = mine.iter().map(|e| 0.5 * found.beta.dot(&e.b)).sum();
+        let predicted = evidence::gain(&mine, self.prior)?.total;
+        Some(Best { agreed: predicted > PREDICTED * whole, ..found })
     }
 
     /// Draws the gain of pure noise.
@@ -180,9 +190,9 @@ pub fn few_views(
 const MAX_NAMES: usize = 3;
 
 /// Returns the candidate to report, of all sorted best first, and the names it may have, none for a
-/// curve. Much looks alike in a few views, so a name must beat nameless curves on other axes. It must
-/// also clearly beat `nameless`, the gain of a nameless cause in all views, whose misfit in some of
-/// them may look like anything. The noise level of one view fits every cause that changes the noise.
+/// curve. Much looks alike in a few views, so a name must beat nameless curves on other axes, and its views
+/// must agree. It must also clearly beat `nameless`, the gain of a nameless cause in all views, whose misfit
+/// in some of them may look like anything. The noise level of one view fits every cause that changes the noise.
 fn told<'a>(
     all: &'a [(&'a Candidate, Best)],
     nameless: f64,
@@ -195,7 +205,7 @@ fn told<'a>(
         others.all(|o| o.1.gain < NAME_ADEQUATE * b.gain)
     };
     let adequate = f64::max(NAME_ADEQUATE * most, BESIDE_NAMELESS * nameless);
-    let named = || all.iter().filter(|(c, b)| c.family.is_some() && b.gain > adequate);
+    let named = || all.iter().filter(|(c, b)| c.family.is_some() && b.agreed && b.gain > adequate);
     let mut names: Vec<&'static str> = Vec::new();
     for family in named().filter_map(|(c, _)| c.family) {
         if !names.contains(&family) {

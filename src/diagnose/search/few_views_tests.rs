@@ -63,6 +63,28 @@ fn noise_brings_less_than_the_choice_costs() {
     assert!(above <= 6, "{above} of 200 above 5 nats");
 }
 
+/// Three views of eighteen with one cause predict one another. Three with errors of their own, of opposite signs
+/// or of one view alone, do not, however clear they are.
+#[test]
+fn views_with_errors_of_their_own_have_no_cause_in_common() {
+    let slope =
+        Candidate::named("column-banding", Basis::powers(Coordinate::Column, 2, Modulation::One));
+    let agreed = |errors: &[[f64; 2]]| {
+        let mut rng = Seed(9).stream("few-views/agreed");
+        let mut one = |v: usize| {
+            let beta = errors.get(v).copied().unwrap_or_default();
+            let white = DVector::from_fn(2, |_, _| StandardNormal.sample(&mut rng));
+            let b = 100.0 * DVector::from_row_slice(&beta) + 10.0 * white;
+            Evidence { a: DMatrix::identity(2, 2) * 100.0, b }
+        };
+        let found = Tried::of(&slope, (0..18).map(&mut one).collect(), 0.1, 1.0).unwrap().best();
+        found.is_some_and(|best| best.views.len() <= errors.len() && best.agreed)
+    };
+    assert!(agreed(&[[1.0, 0.5]; 3]));
+    assert!(!agreed(&[[1.0, 0.5]]));
+    assert!(!agreed(&[[1.5, 0.0], [0.0, 1.5], [-1.0, 1.0]]));
+}
+
 /// Bands that a curve over distance explains as well have no name; they keep it where only a curve over
 /// their own axis does.
 #[test]
@@ -71,8 +93,9 @@ fn a_name_is_better_than_curves_on_other_axes() {
     let [columns, distance] = [Coordinate::Column, Coordinate::Z].map(basis);
     let bands = Candidate::named("column-banding", columns.clone());
     let [own, other] = [columns, distance].map(Candidate::curve);
-    let found =
-        |candidate, gain| (candidate, Best { gain, views: vec![3], beta: DVector::zeros(6) });
+    let found = |candidate, gain| {
+        (candidate, Best { gain, views: vec![3], beta: DVector::zeros(6), agreed: true })
+    };
     let name_of = |all: &[_], nameless| told(all, nameless).unwrap().1.first().copied();
     let cases = [
         (&other, 95.0, None),
@@ -97,8 +120,9 @@ fn what_many_causes_explain_has_no_name() {
     let causes =
         ["slope-noise", "range-exponent", "tilt-axis-anisotropy", "ambient-light"].map(level);
     let curve = Candidate::ring(Coordinate::Column, 1.0, 8);
-    let found =
-        |candidate, gain| (candidate, Best { gain, views: vec![3], beta: DVector::zeros(1) });
+    let found = |candidate, gain| {
+        (candidate, Best { gain, views: vec![3], beta: DVector::zeros(1), agreed: true })
+    };
     let with = |causes| -> Vec<(&Candidate, Best)> {
         let causes: &[Candidate] = causes;
         causes.iter().map(|c| found(c, 24.5)).chain([found(&curve, 4.0)]).collect()

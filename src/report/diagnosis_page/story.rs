@@ -128,8 +128,14 @@ pub(super) fn gained(diagnosis: &Diagnosis) -> Option<String> {
             format!("On {aside} kept aside nothing is gained: without them the same search finds nothing.")
         });
     }
-    let [gain, low, high] = nats([h.gain, h.gain_interval[0], h.gain_interval[1]]);
-    let mut gained = vec![format!("{gain} nats a view are gained [{low}, {high}]")];
+    let [low, high] = h.gain_interval;
+    let (what, all) = if h.gain < 0.0 {
+        ("lost", [-h.gain, -high, -low])
+    } else {
+        ("gained", [h.gain, low, high])
+    };
+    let [by, low, high] = nats(all);
+    let mut gained = vec![format!("{by} nats a view are {what} [{low}, {high}]")];
     if let Some([before, after]) = smooth_residual(h) {
         gained.insert(0, format!("the smooth residual goes from {before} to {after}"));
     }
