@@ -71,22 +71,64 @@ const MIMICS: [[&str; 2]; 9] = [
     ["grazing-dropout", "range-dropout"],
 ];
 
-/// Effects that still show when confined to some views or far distances, to a region, or to late times.
-const BY_VIEW: [&str; 5] = [
+/// Effects that still show, and that a session can have, in some views only: interference, vibration, a
+/// frame sent again, a filter left on, another board, surface, background or light.
+pub const BY_VIEW: [&str; 19] = [
+    "pixel-locking",
+    "column-banding",
+    "radial-disparity-bias",
+    "target-bow",
+    "target-motion",
+    "fixed-pattern-noise",
+    "edge-mixing",
+    "slope-noise",
+    "tilt-axis-anisotropy",
+    "vignetting",
+    "heavy-tails",
+    "spatial-correlation",
+    "temporal-correlation",
+    "frozen-noise",
+    "row-noise",
+    "frame-jitter",
+    "grazing-dropout",
+    "range-dropout",
+    "occlusion-shadow",
+];
+/// The same for far distances, in every view only where it sees them.
+const BY_DISTANCE: [&str; 5] = [
     "pixel-locking",
     "column-banding",
     "radial-disparity-bias",
     "vignetting",
     "tilt-axis-anisotropy",
 ];
-const BY_REGION: [&str; 5] =
-    ["pixel-locking", "column-banding", "vignetting", "range-exponent", "range-dropout"];
-const BY_TIME: [&str; 6] = [
+/// The same for a region: half a chip's amplifiers, a lens that is sharp on one side.
+const BY_REGION: [&str; 7] = [
+    "pixel-locking",
+    "column-banding",
+    "fixed-pattern-noise",
+    "edge-mixing",
+    "vignetting",
+    "range-exponent",
+    "range-dropout",
+];
+/// The same for late times: what warms up, comes loose, fades or is switched on.
+pub const BY_TIME: [&str; 16] = [
     "pixel-locking",
     "column-banding",
     "radial-disparity-bias",
-    "vignetting",
+    "target-motion",
+    "fixed-pattern-noise",
+    "edge-mixing",
     "range-exponent",
+    "slope-noise",
+    "vignetting",
+    "heavy-tails",
+    "spatial-correlation",
+    "temporal-correlation",
+    "frozen-noise",
+    "row-noise",
+    "frame-jitter",
     "range-dropout",
 ];
 
@@ -100,7 +142,8 @@ pub fn names(order: &Order, rng: &mut Stream) -> Vec<String> {
         Cell::Single => vec![one(&CATALOGUE, rng)],
         Cell::Outside => vec![one(&OUTSIDE, rng)],
         Cell::Blind | Cell::Referenced => vec![one(&BLIND, rng)],
-        Cell::FewViews | Cell::Far => vec![one(&BY_VIEW, rng)],
+        Cell::FewViews => vec![one(&BY_VIEW, rng)],
+        Cell::Far => vec![one(&BY_DISTANCE, rng)],
         Cell::Region => vec![one(&BY_REGION, rng)],
         Cell::Late => vec![one(&BY_TIME, rng)],
         Cell::Mimic => lot(&MIMICS, rng).map(String::from).to_vec(),

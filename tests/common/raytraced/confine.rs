@@ -1,14 +1,14 @@
 //! Causes that act in some views, one region, far away or late only.
 
-use std::sync::Arc;
-
 use rand::Rng;
 use rand::seq::SliceRandom;
 
 use super::eye::Site;
 use super::kernels::lot;
+use super::nats::{Ground, Looked};
 use super::poses::Plan;
-use super::{Act, AtSite, Cause, Cell, Unit};
+use super::question::Hidden;
+use super::{Act, Cause, Cell, Unit};
 use kinoise::error::{Error, Result};
 use kinoise::rng::Stream;
 
@@ -26,12 +26,35 @@ pub enum Gate {
     Late([f64; 2]),
 }
 
+/// The `count` views nearest to the tilts or distances on which a cause shows; all where it shows on all.
+fn fittest(label: &Hidden, plans: &[Plan], count: usize) -> Vec<usize> {
+    let at = |plan: &Plan| match label.axis.as_str() {
+        "theta" => Some(plan.stage.theta),
+        "z" => Some(plan.stage.board.depth(0.0, 0.0)),
+        _ => None,
+    };
+    let off = |plan: &Plan| {
+        label.interval.zip(at(plan)).map_or(0.0, |([low, high], x)| (low - x).max(x - high))
+    };
+    let mut off: Vec<(f64, usize)> = plans.iter().map(off).zip(0..).collect();
+    off.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let last = off.get(count - 1).map_or(f64::INFINITY, |o| o.0);
+    off.into_iter().filter(|o| o.0 <= last).map(|o| o.1).collect()
+}
+
 /// Beyond the reach of any set, m.
 const FARTHEST_M: f64 = 10.0;
 
 impl Gate {
     /// Draws a gate that leaves several views on either side; `None` where the cell confines nothing.
-    pub fn draw(cell: Cell, plans: &[Plan], unit: &Unit, rng: &mut Stream) -> Option<Self> {
+    /// Few views are such as can show the first of the `causes`.
+    pub fn draw(
+        cell: Cell,
+        plans: &[Plan],
+        unit: &Unit,
+        causes: &[Cause],
+        rng: &mut Stream,
+    ) -> Option<Self> {
         // Midway between two views, as long as there are enough views.
         let mut between = |of: &dyn Fn(&Plan) -> f64| {
             let mut at: Vec<f64> = plans.iter().map(of).collect();
@@ -49,7 +72,12 @@ impl Gate {
             Cell::FewViews => {
                 let mut all: Vec<usize> = (0..plans.len()).collect();
                 all.shuffle(rng);
-                all.truncate((plans.len() / 4).max(2));
+                let few = (plans.len() / 4).max(2);
+                if let Some(cause) = causes.first() {
+                    let fit = fittest(&cause.label, plans, (plans.len() / 2).max(few));
+                    all.retain(|view| fit.contains(view));
+                }
+                all.truncate(few);
                 all.sort_unstable();
                 Gate::Views(all)
             }
@@ -65,13 +93,21 @@ impl Gate {
         })
     }
 
-    fn open(&self, site: &Site, plan: &Plan) -> bool {
+    /// Whether it lets anything of this view through.
+    fn opens_in(&self, plan: &Plan) -> bool {
         match self {
             Gate::Views(views) => views.contains(&plan.view),
+            Gate::Late([from, _]) => plan.session_s > *from,
+            _ => true,
+        }
+    }
+
+    fn open(&self, site: &Site, plan: &Plan) -> bool {
+        match self {
             Gate::Columns([from, to]) => (*from..*to).contains(&site.u),
             Gate::Rows([from, to]) => (*from..*to).contains(&site.v),
             Gate::Far(from) => site.z > *from,
-            Gate::Late([from, _]) => plan.session_s > *from,
+            _ => self.opens_in(plan),
         }
     }
 
@@ -86,26 +122,44 @@ impl Gate {
         }
     }
 
-    pub fn confine(&self, cause: Cause) -> Result<Cause> {
-        let Cause { mut label, act, worth, window } = cause;
-        let here = Arc::new(self.clone());
-        let only = |f: AtSite, other: f64| -> AtSite {
-            Box::new(move |s, plan| if here.open(s, plan) { f(s, plan) } else { other })
+    /// The samples that it lets through.
+    fn within<'a>(&self, ground: &Ground<'a>) -> Ground<'a> {
+        let within = |look: &Looked<'a>| {
+            let open = look.samples.iter().filter(|s| self.open(&s.site, look.plan()));
+            Looked { eye: look.eye, samples: open.copied().collect() }
         };
-        let act = match act {
-            Act::Mismatch(f) => Act::Mismatch(only(f, 0.0)),
-            Act::Spread(f) => Act::Spread(only(f, 1.0)),
-            Act::Gain(f) => Act::Gain(only(f, 1.0)),
-            Act::Loss(f) => Act::Loss(only(f, 0.0)),
-            _ => {
-                return Err(Error::Argument {
-                    what: format!("{} cannot be confined", label.form),
-                    remedy: "take an effect that acts pixel by pixel",
-                });
-            }
-        };
+        Ground { views: ground.views.iter().map(within).collect(), ..*ground }
+    }
+
+    pub fn confine(&self, mut cause: Cause) -> Result<Cause> {
+        let of_pixels =
+            matches!(cause.act, Act::Mismatch(_) | Act::Spread(_) | Act::Gain(_) | Act::Loss(_));
+        let of_views = matches!(self, Gate::Views(_) | Gate::Late(_));
+        if !of_pixels && !of_views {
+            return Err(Error::Argument {
+                what: format!("{} cannot be confined to a part of a view", cause.label.form),
+                remedy: "take an effect that acts pixel by pixel, or the cell few-views or late",
+            });
+        }
         let (axes, interval) = self.place();
-        (label.also, label.interval) = (axes.iter().map(ToString::to_string).collect(), interval);
-        Ok(Cause { label, act, worth, window })
+        cause.label.also.splice(0..0, axes.iter().map(ToString::to_string));
+        cause.label.interval = interval.or(cause.label.interval);
+        Ok(Cause { only: Some(self.clone()), ..cause })
+    }
+}
+
+impl Cause {
+    /// Whether it acts anywhere in this view.
+    pub fn acts_in(&self, plan: &Plan) -> bool {
+        self.only.as_ref().is_none_or(|gate| gate.opens_in(plan))
+    }
+
+    pub fn acts_at(&self, site: &Site, plan: &Plan) -> bool {
+        self.only.as_ref().is_none_or(|gate| gate.open(site, plan))
+    }
+
+    /// `worth` of the samples where it acts.
+    pub fn where_it_acts(&self, ground: &Ground<'_>, worth: impl Fn(&Ground<'_>) -> f64) -> f64 {
+        self.only.as_ref().map_or_else(|| worth(ground), |gate| worth(&gate.within(ground)))
     }
 }

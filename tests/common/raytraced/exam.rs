@@ -79,7 +79,7 @@ fn seen(world: World<'_>, plan: &Plan) -> (Vec<f32>, Vec<f32>) {
     let eye = Eye::new(world, plan);
     let fb = world.unit.disparity_px_m();
     let (slope, mut tremble, mut cut) = (slope(world.unit, plan), 0.0f64, 0.0);
-    for cause in world.causes {
+    for cause in world.causes.iter().filter(|cause| cause.acts_in(plan)) {
         match cause.act {
             Act::Wander(px) => tremble = tremble.hypot(px),
             // Truncated, a depth is half a step short on average.

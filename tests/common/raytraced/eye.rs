@@ -79,12 +79,16 @@ impl<'a> Eye<'a> {
         Eye { world: World { causes, ..self.world }, ..*self }
     }
 
+    fn acting(&self) -> impl Iterator<Item = &Cause> {
+        self.world.causes.iter().filter(|cause| cause.acts_in(self.plan))
+    }
+
     /// What the pixel's ray meets first.
     pub fn look(&self, u: f64, v: f64) -> Option<Site> {
         let c = &self.world.unit.sensor.camera;
         let (x, y) = c.ray(u, v);
         let mut ray = (x, y);
-        for cause in self.world.causes {
+        for cause in self.acting() {
             if let Act::Ray(bend) = &cause.act {
                 ray = bend(ray.0, ray.1);
             }
@@ -127,9 +131,9 @@ impl<'a> Eye<'a> {
         let lift = |z: f64| {
             let place = board.place(&(ray * z));
             let rise = |cause: &Cause| if let Act::Lift(f) = &cause.act { f(place) } else { 0.0 };
-            self.world.causes.iter().map(rise).sum::<f64>()
+            self.acting().map(rise).sum::<f64>()
         };
-        if !self.world.causes.iter().any(|c| matches!(c.act, Act::Lift(_))) {
+        if !self.acting().any(|c| matches!(c.act, Act::Lift(_))) {
             return flat;
         }
         // A few millimetres of rise move the position on the board by less: three iterations settle it.

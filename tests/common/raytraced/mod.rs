@@ -34,6 +34,7 @@ pub use set::{Order, Set};
 pub use unit::Unit;
 pub use write::{conceal, write};
 
+use confine::Gate;
 use eye::Site;
 use kernels::Window;
 use kinoise::rng::{Seed, Stream};
@@ -122,6 +123,8 @@ pub struct Cause {
     worth: Worth,
     /// Window that filters the noise, and the share of the variance that goes through it.
     window: Option<(Window, f64)>,
+    /// Where it acts; `None` for everywhere.
+    only: Option<Gate>,
 }
 
 /// Context in which a cause is drawn.
@@ -148,7 +151,7 @@ impl Cause {
         let names: &[&str] = if CATALOGUE.contains(&name) { &[name] } else { &[] };
         let mut label = Hidden::new(names, form, [statistic, axis]);
         label.parameters = parameters.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
-        Cause { label, act, worth: Worth::Seen, window: None }
+        Cause { label, act, worth: Worth::Seen, window: None, only: None }
     }
 
     /// Limits where it shows on its axis.

@@ -28,6 +28,7 @@ use super::{Act, Cause, Set, Unit, Worth};
 const STRAYS: f64 = 1e-3;
 
 /// A sampled pixel.
+#[derive(Clone, Copy)]
 pub struct Sample {
     pub site: Site,
     /// Standard deviation of one frame's disparity with the known causes, px.
@@ -166,11 +167,11 @@ impl<'a> Ground<'a> {
     pub fn nats(&self, cause: &Cause) -> Option<f64> {
         Some(match (&cause.worth, &cause.act) {
             (Worth::Never, _) => return None,
-            (Worth::Formula(formula), _) => formula(self),
+            (Worth::Formula(formula), _) => cause.where_it_acts(self, formula),
             (_, Act::Ray(_) | Act::Lift(_) | Act::Mismatch(_) | Act::Gain(_)) => {
                 self.of_mean(cause)
             }
-            (_, Act::Move(gone)) => self.of_motion(gone),
+            (_, Act::Move(gone)) => cause.where_it_acts(self, |ground| ground.of_motion(gone)),
             (_, Act::Spread(_) | Act::Wander(_)) => self.of_spread(cause) / self.repeats.squares,
             (_, Act::Loss(_)) => self.of_loss(cause),
             _ => 0.0,
@@ -230,6 +231,7 @@ impl<'a> Ground<'a> {
         let one = |look: &Looked<'_>| {
             let slope_px = fb * slope(self.unit, look.plan());
             let ratio = |s: &Sample| match &cause.act {
+                _ if !cause.acts_at(&s.site, look.plan()) => 1.0,
                 Act::Wander(px) => 1.0 + (slope_px * px / s.sigma_px).powi(2),
                 Act::Spread(f) => f(&s.site, look.plan()).powi(2),
                 _ => 1.0,

@@ -126,7 +126,7 @@ impl Set {
         let infrared_bits = (lit || rng.random::<f64>() < 0.2).then(|| lot(&[8, 16], &mut rng));
         let printed = by_print || infrared_bits.is_some() && rng.random::<bool>();
         let plans = session.draw(&unit, &mut rng);
-        let gate = Gate::draw(cell, &plans, &unit, &mut rng);
+        let gate = Gate::draw(cell, &plans, &unit, &causes[known_causes..], &mut rng);
         if let Some(gate) = &gate {
             for cause in causes.split_off(known_causes) {
                 causes.push(gate.confine(cause)?);

@@ -29,7 +29,7 @@ pub struct Sum {
 impl Sum {
     pub fn of(causes: &[Cause], site: &Site, plan: &Plan) -> Self {
         let mut sum = Sum { error: 0.0, spread: 1.0, gain: 1.0, answer: 1.0 };
-        for cause in causes {
+        for cause in causes.iter().filter(|cause| cause.acts_at(site, plan)) {
             match &cause.act {
                 Act::Mismatch(f) => sum.error += f(site, plan),
                 Act::Spread(f) => sum.spread *= f(site, plan),
@@ -98,7 +98,8 @@ impl<'a> Still<'a> {
     }
 
     fn acts(&self) -> impl Iterator<Item = &'a Act> {
-        self.set.causes.iter().map(|cause| &cause.act)
+        let plan = self.plan;
+        self.set.causes.iter().filter(|cause| cause.acts_in(plan)).map(|cause| &cause.act)
     }
 
     /// Noise of unit variance.

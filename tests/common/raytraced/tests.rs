@@ -4,6 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use super::choices::{BY_TIME, BY_VIEW};
+use super::confine::Gate;
 use super::question::{Asked, ConcealedSet, Pose, World};
 use super::shoot::{Pixel, Still};
 use super::{Act, CATALOGUE, Cell, OUTSIDE, Order, Set, conceal};
@@ -139,7 +141,10 @@ fn causes_act_with_the_sign_they_are_labelled_with() {
 fn masks_act_where_they_say() {
     let cells = [Cell::FewViews, Cell::Region, Cell::Far, Cell::Late];
     for (cell, seed) in cells.into_iter().flat_map(|c| (0..3).map(move |s| (c, s))) {
-        let mut set = Set::asked(&asked(cell, &[], Some(150.0), seed), Some(10), None).unwrap();
+        // Each changes single pixels, and all four cells have it.
+        let name = ["pixel-locking", "column-banding", "vignetting"][seed as usize];
+        let of = asked(cell, &[name], Some(150.0), seed);
+        let mut set = Set::asked(&of, Some(10), None).unwrap();
         let last = set.causes.pop().unwrap();
         let label = last.label.clone();
         let plain: Vec<Vec<Pixel>> = (0..10).map(|view| Still::new(&set, view).pixels).collect();
@@ -166,6 +171,37 @@ fn masks_act_where_they_say() {
         assert!(!touched.is_empty(), "{cell:?} {seed} acts nowhere");
         assert!(cell != Cell::FewViews || touched.len() <= 3, "{touched:?}");
     }
+}
+
+/// Whatever a cause acts on, frames change in views where it acts, and in no others by a single bit.
+#[test]
+fn what_some_views_have_the_others_lack() {
+    let by_view = BY_VIEW.map(|name| (Cell::FewViews, name));
+    let by_time = BY_TIME.map(|name| (Cell::Late, name));
+    for (cell, name) in by_view.into_iter().chain(by_time) {
+        let of = asked(cell, &[name], Some(50.0), 3);
+        let mut set = Set::asked(&of, Some(8), Some(3)).unwrap();
+        let frames = |set: &Set| -> Vec<Vec<u32>> {
+            let depth = |view| Still::new(set, view).depth(1).into_iter();
+            (0..8).map(|view| depth(view).map(f32::to_bits).collect()).collect()
+        };
+        let with = frames(&set);
+        let cause = set.causes.pop().unwrap();
+        let without = frames(&set);
+        let touched: Vec<usize> = (0..8).filter(|v| with[*v] != without[*v]).collect();
+        let open: Vec<usize> = match cause.only {
+            Some(Gate::Views(views)) => views,
+            Some(Gate::Late([from, _])) => {
+                (0..8).filter(|v| set.plans[*v].session_s > from).collect()
+            }
+            gate => panic!("{cell:?} {name}: {gate:?}"),
+        };
+        assert!(!touched.is_empty() && touched.len() < 8, "{cell:?} {name}: {touched:?}");
+        assert!(touched.iter().all(|v| open.contains(v)), "{cell:?} {name}: {touched:?} {open:?}");
+    }
+    let part = Set::asked(&asked(Cell::Region, &["row-noise"], None, 3), Some(8), Some(3));
+    let told = part.err().unwrap().to_string();
+    assert!(told.contains("cannot be confined to a part of a view"), "{told}");
 }
 
 /// The same bytes every time, the cause's name nowhere, no key that a null lacks. One more view changes none

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::confine::Gate;
 use super::nats::Ground;
 use super::shoot::Still;
 use super::tests::asked;
@@ -22,6 +23,46 @@ fn a_tenth_more_noise_is_worth_what_the_formula_says() {
     let hand = 3.0 * ground.views(|_| 1.0) * 0.5 * (1.21 - 1.0 - 1.21f64.ln());
     let got = ground.nats(&spread("by hand", "", "", &[], |_, _| 1.1)).unwrap();
     assert!((got / hand - 1.0).abs() < 1e-9, "{got} {hand}");
+}
+
+/// Views have nothing in common: a cause is worth in all of them what it is worth in some and in the rest.
+/// A pixel's constant is one number in all views, so that these together say more of it than apart.
+#[test]
+fn some_views_and_the_others_are_worth_all() {
+    let gates = [vec![1, 4], vec![0, 2, 3, 5, 6, 7]].map(Gate::Views);
+    let alone = [
+        "radial-disparity-bias",
+        "target-bow",
+        "target-motion",
+        "vignetting",
+        "slope-noise",
+        "heavy-tails",
+        "spatial-correlation",
+        "temporal-correlation",
+        "frozen-noise",
+        "row-noise",
+        "frame-jitter",
+    ];
+    for name in alone.into_iter().chain(["fixed-pattern-noise"]) {
+        let set = white(Cell::Single, &[name], None);
+        let ground = Ground::of(&set);
+        let worth = |gate: Option<&Gate>| {
+            let cause = set.at_strength(0, 1.0).unwrap();
+            let cause = match gate {
+                Some(gate) => gate.confine(cause).unwrap(),
+                None => cause,
+            };
+            ground.nats(&cause).unwrap()
+        };
+        let [some, others] = [worth(Some(&gates[0])), worth(Some(&gates[1]))];
+        let share = (some + others) / worth(None);
+        assert!(some > 0.0 && others > 0.0, "{name}: {some} {others}");
+        if name == "fixed-pattern-noise" {
+            assert!(share < 0.95, "{name}: {share}");
+        } else {
+            assert!((share - 1.0).abs() < 1e-6, "{name}: {share}");
+        }
+    }
 }
 
 /// Log-likelihood gain of knowing the bias, for fresh noise and a plane fitted to each view. Its mean over
