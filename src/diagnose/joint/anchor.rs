@@ -155,7 +155,7 @@ fn subtract(added: &mut [Effect], parts: impl Fn(&Basis) -> Option<Vec<Vector2<f
             let sum =
                 |of: &[f64]| -> Vector2<f64> { of.iter().zip(&parts).map(|(c, p)| *c * p).sum() };
             let whole = sum(coefficients);
-            for (j, times) in [Modulation::One, Modulation::Disparity].into_iter().enumerate() {
+            for (j, times) in [(1, Modulation::Disparity), (0, Modulation::One)] {
                 let constant = lift(effect, times, -whole[j], 0.0);
                 // It has the same error as the shape.
                 for factor in effect.covariance.iter_mut().flat_map(|c| &mut c.factors) {
