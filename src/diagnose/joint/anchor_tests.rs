@@ -151,7 +151,10 @@ fn a_curve_over_the_distance_moves_the_views_the_least() {
             gathered: Vec::new(),
         }
     };
-    let views: Vec<ViewData> = [12.0, 17.0, 23.0, 31.0, 38.0, 47.0].iter().map(view).collect();
+    let views: Vec<ViewData> = [12.0, 15.0, 17.0, 20.0, 23.0, 27.0, 31.0, 35.0, 38.0, 43.0, 47.0]
+        .iter()
+        .map(view)
+        .collect();
     let_distances_be(&mut added, &views);
     let effect = &added[0];
     let errors = &effect.covariance.as_ref().unwrap().factors[0];
