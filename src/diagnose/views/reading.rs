@@ -1,5 +1,7 @@
 //! Reads the views as fields of residuals, checks them and drops duplicates.
 
+use std::iter::Sum;
+
 use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 
 use super::field::Field;
@@ -97,8 +99,8 @@ fn bits(residuals: &[f32]) -> Vec<u32> {
 /// Usable views, and the excluded ones.
 type Read = (Vec<Field>, Vec<Excluded>);
 
-/// Level of the exact McNemar test for reading raw values as ranges: reached by five views that are flat only
-/// as ranges and none that are flat only as depths. No other known cause turns a non-plane into a plane.
+/// Level of the exact sign test for reading raw values as ranges: reached by five views that are flat only as
+/// ranges, or flatter as these, and none as depths.
 const RANGES_LEVEL: f64 = 0.05;
 
 /// Tests whether the views become flat once their raw values are read as ranges. If so, returns them read
@@ -114,7 +116,9 @@ fn as_ranges(
         Binomial::new(0.5, won + lost).map_or(1.0, |b| b.pmf(won) + b.sf(won))
     };
     let refused = (recording.views.len() - as_depths.len()) as u64;
-    if chance(refused, 0) > RANGES_LEVEL || known.has("range-not-depth") {
+    let bowls: Vec<Bowl> = as_depths.iter().map(|f| Bowl::of(f, bench)).collect();
+    let bent = bowls.iter().copied().sum::<Bowl>().is_nearer_to_ranges();
+    if known.has("range-not-depth") || !(bent || chance(refused, 0) <= RANGES_LEVEL) {
         return None;
     }
     let bench = Workbench { ray_share: 1.0, ..Workbench::new(bench.sensor, bench.options) };
@@ -124,12 +128,13 @@ fn as_ranges(
     if fields.len() < MIN_VIEWS {
         return None;
     }
-    let only = |these: &[Field], those: &[Field]| {
-        these.iter().filter(|f| those.iter().all(|g| g.name != f.name)).count() as u64
-    };
-    let p = chance(only(&fields, as_depths), only(as_depths, &fields));
-    let none_left = || share_left(&fields, &bench).is_some_and(|s| s.abs() < PART_OF_RANGES);
-    (p <= RANGES_LEVEL && none_left()).then_some(((fields, excluded), p))
+    let in_depths = |f: &&Field| as_depths.iter().any(|g| g.name == f.name);
+    let alone = fields.iter().filter(|f| !in_depths(f)).count();
+    let bent = bowls.iter().filter(|b| b.is_nearer_to_ranges()).count();
+    let p = chance((alone + bent) as u64, (as_depths.len() - bent) as u64);
+    let left: Bowl = fields.iter().map(|f| Bowl::of(f, &bench)).sum();
+    let none_left = left.share().is_some_and(|s| s.abs() < PART_OF_RANGES);
+    (p <= RANGES_LEVEL && none_left).then_some(((fields, excluded), p))
 }
 
 /// Largest share of the range-depth difference that may remain once raw values are read as ranges; beyond it
@@ -139,9 +144,15 @@ const PART_OF_RANGES: f64 = 0.05;
 /// Step between the sampled pixels.
 const STRIDE: usize = 61;
 
-/// Share of the range-depth difference left in the fields' means, fitted together with a plane per view.
-fn share_left(fields: &[Field], bench: &Workbench<'_>) -> Option<f64> {
-    let of_view = |f: &Field| {
+/// Normal equation of the share of the range-depth difference in a mean, beside a plane.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bowl {
+    a: f64,
+    b: f64,
+}
+
+impl Bowl {
+    fn of(f: &Field, bench: &Workbench<'_>) -> Self {
         let pixels = Pixels::new(&bench.sensor.camera, &bench.rays, f.scale_px_m);
         let seen = (0..f.pixels.len()).step_by(STRIDE).filter(|&k| f.mean[k].is_finite());
         let mut view = ViewData { precision: vec![0.0; 3], ..ViewData::default() };
@@ -154,14 +165,26 @@ fn share_left(fields: &[Field], bench: &Workbench<'_>) -> Option<f64> {
             view.nuisance.extend([1.0, place.x, place.y]);
             places.push(place);
         }
-        let rows = view.rows(&view.response)?;
-        Some(rows.evidence(&RAY_FOR_DEPTH, &places))
-    };
-    let (a, b) = fields
-        .iter()
-        .filter_map(of_view)
-        .fold((0.0, 0.0), |(a, b), e| (a + e.a[(0, 0)], b + e.b[0]));
-    (a > 0.0).then(|| b / a)
+        view.rows(&view.response).map_or_else(Bowl::default, |rows| {
+            let e = rows.evidence(&RAY_FOR_DEPTH, &places);
+            Bowl { a: e.a[(0, 0)], b: e.b[0] }
+        })
+    }
+
+    fn share(&self) -> Option<f64> {
+        (self.a > 0.0).then(|| self.b / self.a)
+    }
+
+    /// Depths have none of the difference and ranges all of it; halfway both fit as well.
+    fn is_nearer_to_ranges(&self) -> bool {
+        self.share().is_some_and(|share| share > 0.5)
+    }
+}
+
+impl Sum for Bowl {
+    fn sum<I: Iterator<Item = Bowl>>(all: I) -> Bowl {
+        all.fold(Bowl::default(), |s, o| Bowl { a: s.a + o.a, b: s.b + o.b })
+    }
 }
 
 fn range_term() -> Term {
