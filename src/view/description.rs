@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{IntrinsicsUncertainty, Sensor};
 use crate::camera::Camera;
 use crate::frame::{DepthCode, RawDisparity};
-use crate::sensors::SensorKind;
+use crate::sensors::{Preset, SensorKind};
 
 /// `recording.json` (`crate::docs::layouts`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -83,6 +83,8 @@ impl RecordingFile {
                 return Err("units_per_metre and raw_disparity contradict each other".into());
             }
         };
+        // A preset's name states the kind as `--sensor` does.
+        let kind = self.kind.or_else(|| Preset::find(&self.sensor).map(|preset| preset.kind));
         let sensor = Sensor {
             name: self.sensor,
             serial: self.serial,
@@ -91,7 +93,7 @@ impl RecordingFile {
             baseline_m: self.baseline_m,
             code,
             intrinsics_uncertainty: self.intrinsics_uncertainty,
-            kind: self.kind,
+            kind,
         };
         match sensor.fault() {
             Some(fault) => Err(fault),
