@@ -1,5 +1,6 @@
 //! Border columns and rows that are empty in all views because the sensor does not fill its image. A
-//! Kinect v1 leaves eight columns on the right empty, which no matching window reaches.
+//! Kinect v1 leaves eight columns on the right empty, which no matching window reaches. A target's region
+//! may end within them, so that the outermost lines are not asked for at all.
 
 use super::field::Field;
 use super::tiles::SIDE;
@@ -13,23 +14,39 @@ pub struct Margins {
     size: [usize; 2],
 }
 
+/// Readings of the target on one line of the picture.
+#[derive(Debug, Clone, Copy, Default)]
+struct Line {
+    asked: usize,
+    measured: usize,
+    /// Views that ask for any.
+    views: usize,
+}
+
 /// Least number of target readings, all missing, for a line to count as empty. With nine in ten readings lost
 /// for another reason, one such line in 10^4 would count.
 const ASKED: usize = 100;
+/// Least number of views that ask for it: one alone may have lost it for a reason of its own.
+const VIEWS: usize = 2;
 /// Widest margin of a sensor, as a share of the picture; a wider one is reported as a loss.
 const WIDEST: f64 = 1.0 / 16.0;
 
 impl Margins {
     pub fn of(fields: &[Field]) -> Self {
         let size = fields.first().map_or([0, 0], |f| [f.width, f.height]);
-        let mut lines = size.map(|n| vec![[0usize; 2]; n]);
+        let mut lines = size.map(|n| vec![Line::default(); n]);
         for f in fields {
+            let mut asks = size.map(|n| vec![false; n]);
             for (&i, &measured) in f.pixels.iter().zip(&f.measured) {
                 let place = [i as usize % f.width, i as usize / f.width];
-                for (line, at) in lines.iter_mut().zip(place) {
-                    line[at][0] += f.frames.len();
-                    line[at][1] += usize::from(measured);
+                for ((lines, asks), at) in lines.iter_mut().zip(&mut asks).zip(place) {
+                    lines[at].asked += f.frames.len();
+                    lines[at].measured += usize::from(measured);
+                    asks[at] = true;
                 }
+            }
+            for (line, asks) in lines.iter_mut().flatten().zip(asks.iter().flatten()) {
+                line.views += usize::from(*asks);
             }
         }
         let [columns, rows] = lines.map(|line| seen(&line));
@@ -67,33 +84,55 @@ impl Margins {
     }
 }
 
-/// First and last line with measurements, from the readings asked for and measured in each.
-fn seen(lines: &[[usize; 2]]) -> [usize; 2] {
+/// First and last line with measurements.
+fn seen(lines: &[Line]) -> [usize; 2] {
     let n = lines.len();
-    let empty = |line: &&[usize; 2]| line[0] >= ASKED && line[1] == 0;
     let widest = (WIDEST * n as f64) as usize;
     let allowed = |margin: usize| if margin > widest { 0 } else { margin };
-    let first = allowed(lines.iter().take_while(empty).count());
-    let last = allowed(lines.iter().rev().take_while(empty).count());
+    let first = allowed(margin(lines.iter()));
+    let last = allowed(margin(lines.iter().rev()));
     [first, n.saturating_sub(1 + last)]
+}
+
+/// Lines from the border inwards, up to the last empty one before the first with a measurement. Those
+/// outside it may be asked for too seldom to tell.
+fn margin<'a>(inwards: impl Iterator<Item = &'a Line>) -> usize {
+    let empty = |line: &Line| line.asked >= ASKED && line.views >= VIEWS;
+    let silent = inwards.take_while(|line| line.measured == 0).enumerate();
+    silent.filter(|(_, line)| empty(line)).last().map_or(0, |(at, _)| at + 1)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn line(asked: usize, measured: usize) -> Line {
+        Line { asked, measured, views: VIEWS }
+    }
+
     #[test]
     fn empty_lines_at_the_border_are_no_part_of_the_picture() {
-        let mut lines = vec![[500, 480]; 160];
-        lines[152..].fill([500, 0]);
+        let mut lines = vec![line(500, 480); 160];
+        lines[152..].fill(line(500, 0));
         assert_eq!(seen(&lines), [0, 151]);
-        lines[80] = [500, 0];
+        lines[80] = line(500, 0);
         assert_eq!(seen(&lines), [0, 151], "a dead line in the middle is a loss");
-        lines[155] = [500, 1];
+        lines[155] = line(500, 1);
         assert_eq!(seen(&lines), [0, 155], "from the border inwards, as long as nothing answers");
-        lines[120..].fill([500, 0]);
+        lines[120..].fill(line(500, 0));
         assert_eq!(seen(&lines), [0, 159], "a quarter of the picture is no margin");
-        assert_eq!(seen(&vec![[99, 0]; 160]), [0, 159], "too little was asked");
+        assert_eq!(seen(&vec![line(99, 0); 160]), [0, 159], "too little was asked");
         assert_eq!(seen(&[]), [0, 0]);
+    }
+
+    #[test]
+    fn a_region_may_end_within_the_margin() {
+        let mut lines = vec![line(500, 480); 160];
+        lines[..2].fill(line(0, 0));
+        assert_eq!(seen(&lines), [0, 159], "not asked for, so nothing is known");
+        lines[2] = line(500, 0);
+        assert_eq!(seen(&lines), [3, 159]);
+        lines[2].views = VIEWS - 1;
+        assert_eq!(seen(&lines), [0, 159], "one view alone");
     }
 }
