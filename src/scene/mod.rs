@@ -53,6 +53,13 @@ impl TargetFrame {
         TargetFrame { centre, right, down: normal.cross(&right) }
     }
 
+    /// The same turned in its plane by this angle, from its right towards its down.
+    pub fn turned(self, angle_rad: f64) -> Self {
+        let (sin, cos) = angle_rad.sin_cos();
+        let right = cos * self.right + sin * self.down;
+        TargetFrame { right, down: cos * self.down - sin * self.right, ..self }
+    }
+
     /// Coordinates of a point, m: right and down of the centre.
     pub fn place(&self, point: &Vector3<f64>) -> (f64, f64) {
         let offset = point - self.centre;

@@ -98,7 +98,7 @@ pub struct PixelContext {
     pub slope: [f64; 2],
     /// Distance from the principal point over that of the farthest corner, 0 to 1.
     pub radius: f64,
-    /// Position on the target: right and down of its centroid, m.
+    /// Position on the target along its sides: right and down of its centroid, m.
     pub right: f64,
     pub down: f64,
     /// Distance of the plane from the camera, m.

@@ -2,6 +2,7 @@
 
 pub mod between;
 pub mod blocks;
+mod board;
 pub mod box_sums;
 pub mod column_steps;
 pub mod exposure;

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::board::board_frame;
 use super::field::Field;
 use crate::camera::{Camera, Rays};
 use crate::diagnose::noise::texture::high_passed;
@@ -88,7 +89,7 @@ impl<'a> Places<'a> {
             field,
             camera,
             rays,
-            board: board_frame(field, rays),
+            board: board_frame(field, camera, rays),
             corner: corner_radius(camera),
             view,
         }
@@ -216,18 +217,6 @@ impl Sums {
         };
         (PixelContext { light: self.n / self.darkness, variance, ..place }, tile)
     }
-}
-
-/// Coordinates on the target, with the origin at the centroid of its pixels.
-fn board_frame(field: &Field, rays: &Rays) -> TargetFrame {
-    const ENOUGH: usize = 5000;
-    let stride = (field.pixels.len() / ENOUGH).max(1);
-    let few: Vec<u32> = field.pixels.iter().copied().step_by(stride).collect();
-    let sum = few.iter().fold(Vector3::zeros(), |sum, &i| {
-        let (x, y) = rays.at(i as usize);
-        sum + Vector3::new(x, y, 1.0) * field.plane.depth(x, y)
-    });
-    TargetFrame::on(&field.plane, sum / few.len() as f64)
 }
 
 /// Measures the high-passed mean, with the known bias subtracted (px by pixel, or empty).
