@@ -129,7 +129,6 @@ impl Choice<'_> {
     /// Name to take, if any: of those as good as the best, the family with the fewest columns, by its simplest
     /// significant shape.
     fn name(&self, families: &[usize], curves: &[usize]) -> Option<usize> {
-        let best_curve = self.best_curve(curves);
         let best_family =
             families.first().map_or(f64::NEG_INFINITY, |&i| self.dispersion_corrected_gain(i));
         let most = families.iter().map(|&i| self.total(i)).fold(0.0, f64::max);
@@ -145,29 +144,33 @@ impl Choice<'_> {
             })
         };
         let family = self.candidates[simplest(&mut as_good())?].family;
-        // A family's simplest shape may be too weak where a wider one of it is not.
+        // A family's simplest shape may be too weak where a wider one of it is not. Of those with as few columns
+        // the steadiest may explain too little.
         let own = |&i: &usize| self.candidates[i].family == family && self.is_significant(i);
-        simplest(&mut as_good().filter(own))
-            .filter(|&i| self.total(i) > self.adequacy(i) * best_curve)
-            .filter(|&i| {
-                let axis = |k: usize| self.candidates[k].basis.axis();
-                let own = curves.iter().copied().find(|&k| axis(k) == axis(i));
-                let least =
-                    own.map_or(0.0, |k| self.rules.own_axis_adequacy * self.total(k).max(0.0));
-                // A name with a lower adequacy of its own may ride on another cause's error.
-                let alone = self.adequacy(i) >= self.rules.adequacy;
-                !alone || self.total(i) > least
-            })
-            // A nameless curve with fewer columns and a larger gain speaks against the name.
-            .filter(|&i| {
-                let simpler = |&k: &usize| columns(k) < columns(i) && self.total(k) > self.total(i);
-                !curves.iter().any(simpler)
-            })
-            .filter(|&i| self.is_sensible(i))
-            .filter(|&i| {
-                let clear = self.total(i) > CLEAR * best_curve;
-                clear || self.judged[i].as_ref().is_some_and(consistent_across_views)
-            })
+        let fewest = as_good().filter(own).map(columns).min()?;
+        as_good()
+            .filter(own)
+            .filter(|&i| columns(i) == fewest)
+            .find(|&i| self.explains_enough(i, curves))
+    }
+
+    /// Whether a name explains enough of what nameless curves do, and the views do not speak against it.
+    fn explains_enough(&self, i: usize, curves: &[usize]) -> bool {
+        let (total, best_curve) = (self.total(i), self.best_curve(curves));
+        let columns = |i: usize| self.candidates[i].basis.count();
+        let axis = |k: usize| self.candidates[k].basis.axis();
+        let own = curves.iter().copied().find(|&k| axis(k) == axis(i));
+        let least = own.map_or(0.0, |k| self.rules.own_axis_adequacy * self.total(k).max(0.0));
+        // A name with a lower adequacy of its own may ride on another cause's error.
+        let alone = self.adequacy(i) >= self.rules.adequacy;
+        // A nameless curve with fewer columns and a larger gain speaks against the name.
+        let simpler = |&k: &usize| columns(k) < columns(i) && self.total(k) > total;
+        let steady = || self.judged[i].as_ref().is_some_and(consistent_across_views);
+        total > self.adequacy(i) * best_curve
+            && (!alone || total > least)
+            && !curves.iter().any(simpler)
+            && self.is_sensible(i)
+            && (total > CLEAR * best_curve || steady())
     }
 
     /// The best of each family: for the winner's the shape with the largest gain, for the others the
@@ -258,28 +261,5 @@ pub fn over_error(values: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use crate::diagnose::search::candidate::Candidate;
-    use crate::diagnose::search::search;
-    use crate::diagnose::search::tests::{RULES, session};
-    use crate::rng::Seed;
-    use crate::terms::{Axis, Basis, Coordinate, Modulation, PixelContext};
-
-    /// A ramp over the rows with a small part over the columns is a row curve first; what depends
-    /// equally on both is a map.
-    #[test]
-    fn a_map_is_for_what_depends_on_both() {
-        type Bias = fn(&PixelContext) -> f64;
-        let ramp: Bias = |p| 1.5 * p.v / 480.0 + 0.15 * p.u / 640.0;
-        let hill: Bias = |p| (-((p.u - 300.0).powi(2) + (p.v - 200.0).powi(2)) / 2e4).exp();
-        let (over, times) = (Coordinate::Row, Modulation::One);
-        let rows = Basis::Curve { over, low: 0.0, high: 479.0, nodes: 9, times };
-        let map = Basis::Map { width: 640.0, height: 480.0, across: 6, down: 4, times };
-        let candidates = [rows, map].map(Candidate::curve);
-        for (seed, bias, axis) in [(1, ramp, Axis::Row), (2, hill, Axis::Pixel)] {
-            let views = session(&mut Seed(seed).stream("choose"), bias);
-            let outcome = search(&views, &views, &candidates, None, &RULES, Seed(seed));
-            assert_eq!(outcome.chosen[0].candidate.basis.axis(), axis);
-        }
-    }
-}
+#[path = "choose_tests.rs"]
+mod tests;
