@@ -25,7 +25,7 @@ fn a_map_is_for_what_depends_on_both() {
     }
 }
 
-/// A bias of r^2 that grows with d^0.3: r d^0.3 is steadier over the views and explains 95 % of the best curve,
+/// A bias of r^2 that grows with d^0.3: r d^0.3 is steadier over the views and explains 95 to 98 % of the best curve,
 /// r^2 all of it.
 #[test]
 fn of_two_shapes_as_simple_the_one_that_explains_enough_is_named() {
@@ -37,7 +37,7 @@ fn of_two_shapes_as_simple_the_one_that_explains_enough_is_named() {
     let (over, times) = (Coordinate::Radius, Modulation::One);
     let rest = Candidate::curve(Basis::Curve { over, low: 0.0, high: 1.0, nodes: 10, times });
     let candidates = [of(over, 0.3), of(Coordinate::RadiusSquared, 0.0), rest];
-    let rules = Rules { own_axis_adequacy: 0.97, ..RULES };
+    let rules = Rules { own_axis_adequacy: 0.99, ..RULES };
     for seed in [1, 2, 3] {
         let views = session(&mut Seed(seed).stream("choose/as-simple"), grown);
         let outcome = search(&views, &views, &candidates, None, &rules, Seed(seed));
