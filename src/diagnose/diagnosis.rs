@@ -4,8 +4,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::camera::Camera;
-use crate::effects::{self, Active, Effect, Settings};
 use crate::model::Covariance;
 use crate::terms::{Axis, Statistic, Term};
 
@@ -125,29 +123,6 @@ impl Finding {
         matches!(self.effect, Some("depth-scale" | "disparity-offset" | "thermal-drift"))
     }
 
-    /// Whether `correct` takes it out of depth images: the model holds terms that can be subtracted, or a
-    /// formula that can be inverted.
-    pub fn is_corrected(&self) -> bool {
-        let held = self.of_some.is_none() && self.contradicted.is_none();
-        held && match &self.terms[..] {
-            [] => self.has_inverse() && self.has_strength(),
-            terms => terms.iter().any(Term::is_correctable),
-        }
-    }
-
-    fn has_inverse(&self) -> bool {
-        let any = Camera::centred(640, 480, 585.0);
-        let inverse = |e: &dyn Effect| e.inverse(&Settings::typical(e.card()), &any);
-        self.effect.and_then(effects::find).and_then(inverse).is_some()
-    }
-
-    /// Whether the strength of its effect was measured; the model holds an effect without one by its name alone.
-    pub fn has_strength(&self) -> bool {
-        let card = self.effect.and_then(effects::find).map(|e| e.card());
-        let strength = card.and_then(|c| c.parameters.first());
-        strength.is_none_or(|p| self.value(p.name).is_some())
-    }
-
     /// Text on how many views have it, where not all do.
     pub fn which_views(&self) -> Option<String> {
         self.of_some.map(in_some_views)
@@ -156,26 +131,6 @@ impl Finding {
     /// Measured value of a parameter, without its error.
     pub fn value(&self, parameter: &str) -> Option<f64> {
         self.parameters.get(parameter)?.get("value")?.as_f64()
-    }
-
-    /// Effect of the catalogue that reproduces this finding in the simulator, with typical values for
-    /// parameters that were not measured. `None` without a name, and where the strength is unknown or outside
-    /// the formula's range.
-    pub fn as_effect(&self) -> Option<Active> {
-        let named = matches!(self.status, Status::Named | Status::OneOf);
-        let mut active = Active::typical(self.effect.filter(|_| named)?).ok()?;
-        let card = active.effect.card();
-        for (n, knob) in card.parameters.iter().enumerate() {
-            let [low, high] = knob.range;
-            match self.value(knob.name) {
-                Some(v) if n > 0 => active = active.with(knob.name, v.clamp(low, high)).ok()?,
-                Some(v) => active = active.with(knob.name, v).ok()?,
-                // An unstated share is the whole.
-                None if n == 0 && knob.name != "share" => return None,
-                None => {}
-            }
-        }
-        Some(active)
     }
 }
 

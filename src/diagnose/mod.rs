@@ -22,6 +22,7 @@ mod missing;
 mod noise;
 mod options;
 mod pictures;
+mod reproduced;
 mod search;
 mod steps;
 mod verdict;

@@ -61,7 +61,8 @@ pub fn cells<'a>(patches: &'a [Vec<Patch>], together: &[f64]) -> Vec<Vec<Cell<'a
     patches.iter().zip(together).map(|(view, together)| of_view(view, *together)).collect()
 }
 
-/// Median of the patches' shares, weighted by the readings asked for: a clump does not move it.
+/// Median of the patches' shares, weighted by the readings asked for: a clump does not move it. Where most patches
+/// lose nothing, the share of all.
 fn usual_share(view: &[Patch]) -> f64 {
     let mut shares: Vec<[f64; 2]> = view.iter().map(|p| [p.lost / p.asked, p.asked]).collect();
     shares.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -70,7 +71,11 @@ fn usual_share(view: &[Patch]) -> f64 {
         left -= asked;
         left <= 0.0
     });
-    middle.map_or(0.0, |s| s[0])
+    let of_all = || {
+        let [lost, asked] = view.iter().fold([0.0; 2], |s, p| [s[0] + p.lost, s[1] + p.asked]);
+        if asked > 0.0 { lost / asked } else { 0.0 }
+    };
+    middle.map(|s| s[0]).filter(|share| *share > 0.0).unwrap_or_else(of_all)
 }
 
 /// Cells across the picture: about a hundred a view, each wider than a clump of dead pixels.

@@ -281,4 +281,6 @@ fn touches(views: &[Vec<Cell<'_>>], end: &HardEnd) -> bool {
 }
 
 #[cfg(test)]
+mod single_losses_tests;
+#[cfg(test)]
 mod tests;

@@ -13,6 +13,7 @@ use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::rows::Rows;
 use crate::rng::Seed;
+use crate::stats::{mean, median};
 use crate::terms::Basis;
 
 /// Prior precision of a step's size about the whole step: 1 ± 0.5.
@@ -69,6 +70,15 @@ fn usual(odds: &[Vec<f64>]) -> f64 {
     if share(at(0.5)) < MUCH { at(0.5) } else { at(0.1) }
 }
 
+/// Same where most patches lose nothing, and their median shows nothing of single losses: the middle one of the
+/// views' means, without the bias of their counts.
+fn usual_of_few(odds: &[Vec<f64>], views: &[Vec<Cell<'_>>]) -> f64 {
+    let of_view = |(odds, cells): (&Vec<f64>, &Vec<Cell<'_>>)| {
+        mean(odds.iter().zip(cells).map(|(odds, c)| odds - c.bias))
+    };
+    median(&mut odds.iter().zip(views).filter_map(of_view).collect::<Vec<f64>>())
+}
+
 /// Gain (nats) and coefficients of a shape of this evidence.
 fn gained(shape: &Shape, views: &[Evidence]) -> Option<(f64, Vec<f64>)> {
     match shape {
@@ -94,7 +104,10 @@ impl<'a> Losses<'a> {
             .map(|(cells, e)| cells.iter().zip(e).map(|(c, e)| c.odds() - e).collect())
             .collect();
         // A median of counts has no bias.
-        let level = usual(&left).max(odds(0.0));
+        let level = match usual(&left) {
+            level if level > odds(0.0) => level,
+            _ => usual_of_few(&left, views).max(odds(0.0)),
+        };
         for (y, c) in left.iter_mut().flatten().zip(views.iter().flatten()) {
             *y -= c.bias + level;
         }

@@ -12,7 +12,7 @@ const VIEWS: usize = 14;
 
 /// Cells of views whose pixels are lost by `loss` and by chance: in some views more than in others, and in
 /// clumps.
-fn session(
+pub fn session(
     share: f64,
     rng: &mut Stream,
     loss: impl Fn(&PixelContext) -> f64,
@@ -63,7 +63,7 @@ fn session(
     (views.collect(), camera)
 }
 
-fn find(views: &[Vec<Patch>], camera: &Camera, seed: Seed) -> DropoutOutcome {
+pub fn find(views: &[Vec<Patch>], camera: &Camera, seed: Seed) -> DropoutOutcome {
     find_beside(views, None, camera, seed)
 }
 
