@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
-use kinoise::effects::Active;
+use kinoise::effects::{Active, Stage};
 use kinoise::simulate::Physics;
 use kinoise::simulate::room::{
     CLEARANCE_M, Pose, Resampled, Room, around_the_desks, place, read_trajectory, resample,
@@ -105,6 +105,6 @@ pub fn refuse_of_target(physics: &Physics, given: &[Active]) -> anyhow::Result<(
 
 /// Ids of the effects that act on a target alone.
 fn of_target(effects: &[Active]) -> impl Iterator<Item = &'static str> {
-    let act = effects.iter().filter(|a| !a.is_identity()).map(|a| a.effect.card().id);
-    act.filter(|id| matches!(*id, "target-bow" | "target-motion"))
+    let act = effects.iter().filter(|a| !a.is_identity()).map(|a| a.effect.card());
+    act.filter(|card| card.stage == Stage::Surface).map(|card| card.id)
 }

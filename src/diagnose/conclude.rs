@@ -189,7 +189,7 @@ impl Case<'_> {
 
     /// Makes curves over the distance move these views the least.
     pub(in crate::diagnose) fn let_distances_be(&self, added: &mut [Effect]) {
-        if added.iter().flat_map(|e| &e.shape).any(|t| is_over_distance(t) && t.is_correctable()) {
+        if added.iter().flat_map(|e| &e.shape).any(is_over_distance) {
             let_distances_be(added, &self.survey.coarse_mean_data());
         }
     }

@@ -144,9 +144,9 @@ impl Case<'_> {
         if ours < MIN_VIEWS {
             return Vec::new();
         }
-        let mut all = [Effect { shape: bias.to_vec(), ..Effect::default() }];
-        self.let_distances_be(&mut all);
-        let [Effect { shape: bias, .. }] = &all;
+        let mut learnt = Effect { shape: bias.to_vec(), ..Effect::default() };
+        self.let_distances_be(std::slice::from_mut(&mut learnt));
+        let bias = &learnt.shape;
         // Only terms that vanish on the optical axis by their physics show how far the plane bent there.
         let anchored: Vec<Term> =
             bias.iter().filter(|t| t.basis.is_nothing_ahead()).cloned().collect();

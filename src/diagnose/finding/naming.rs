@@ -229,6 +229,18 @@ mod tests {
         assert_eq!(untested.effect, Some("vignetting"), "no test has weighed it");
     }
 
+    /// At 1 % the odds of chance are 4 e 0.01 ln(100) = 1/2. No evidence leaves the prior odds.
+    #[test]
+    fn a_p_value_near_its_level_leaves_room_for_chance() {
+        assert!(by_chance(1e-6) < 2e-4 && (by_chance(1.0) - 0.8).abs() < 1e-12);
+        let alternatives = vec![Alternative { effect: "vignetting", probability: Some(1.0) }];
+        let vignette = named("vignetting", Statistic::Variance, Axis::Radius);
+        let mut doubtful = Finding { p_adjusted: Some(0.01), alternatives, ..vignette };
+        finish(&mut doubtful);
+        let sure = doubtful.alternatives[0].probability.unwrap();
+        assert!((sure - 0.6663).abs() < 1e-4, "{sure}");
+    }
+
     /// Twelve nats are 25 = 5^2 times the information of the prior.
     #[test]
     fn each_column_more_costs_the_root_of_what_was_seen() {

@@ -106,35 +106,36 @@ fn constants(families: &[Family], checked: &[ReferencedView], variances: &[f64])
 pub fn let_planes_be(added: &mut [Effect], camera: &Camera) {
     let rays = camera.rays();
     let pixels = Pixels::new(camera, &rays, 1.0);
-    subtract(added, |basis| {
-        let Basis::Lens { reference_px, .. } = *basis else { return None };
-        let mean = mean_stretch(basis, reference_px, &pixels)?;
+    subtract(added, |lens| {
+        let Basis::Lens { reference_px, .. } = lens.basis else { return None };
+        let mean = mean_stretch(&lens.basis, reference_px, &pixels)?;
         Some(mean.into_iter().map(|m| Vector2::new(-reference_px * m, m)).collect())
     });
 }
 
-/// Whether it is a curve over the distance alone, not a ripple, which has next to no linear part.
+/// Whether it is a bias that `correct` subtracts along a curve over the distance alone, not a ripple, which has
+/// next to no linear part.
 pub fn is_over_distance(term: &Term) -> bool {
-    let basis = &term.basis;
-    basis.alone() == Some(Coordinate::Disparity) && basis.period().is_none()
+    let Term { basis, .. } = term;
+    let is_curve = basis.alone() == Some(Coordinate::Disparity) && basis.period().is_none();
+    is_curve && term.is_correctable()
 }
 
 /// Subtracts from the curves over the distance of `added` what planes absorb: the disparity of a plane is
 /// linear in the picture, so that no view shows a constant or a multiple of it, and a fit leaves them to
 /// chance. What is left moves the samples of the `views` that they were learnt on the least (least squares).
 pub fn let_distances_be(added: &mut [Effect], views: &[ViewData]) {
-    subtract(added, |basis| {
-        let over = Term::bias(basis.clone(), Vec::new());
-        if !is_over_distance(&over) {
+    subtract(added, |curve| {
+        if !is_over_distance(curve) {
             return None;
         }
-        let mut products = vec![Vector2::zeros(); basis.count()];
+        let mut products = vec![Vector2::zeros(); curve.coefficients.len()];
         let mut square = Matrix2::zeros();
         for view in views {
             for (place, &w) in view.places.iter().zip(&view.weight) {
                 let line = Vector2::new(1.0, place.disparity);
                 square += w * line * line.transpose();
-                basis.visit(place, |k, g| products[k] += w * g * line);
+                curve.basis.visit(place, |k, g| products[k] += w * g * line);
             }
         }
         let inverse = square.try_inverse()?;
@@ -143,18 +144,18 @@ pub fn let_distances_be(added: &mut [Effect], views: &[ViewData]) {
 }
 
 /// Subtracts from the shapes of `added` a constant of the disparity, px, and a share of it, for each of their
-/// coefficients: `parts` of their basis, `None` where it has none.
-fn subtract(added: &mut [Effect], parts: impl Fn(&Basis) -> Option<Vec<Vector2<f64>>>) {
+/// coefficients: `parts` of a term, `None` where it has none.
+fn subtract(added: &mut [Effect], parts: impl Fn(&Term) -> Option<Vec<Vector2<f64>>>) {
     for effect in added {
         let mut first = 0;
         for k in 0..effect.shape.len() {
-            let Term { basis, coefficients, .. } = &effect.shape[k];
-            let span = first..first + coefficients.len();
+            let term = &effect.shape[k];
+            let span = first..first + term.coefficients.len();
             first = span.end;
-            let Some(parts) = parts(basis) else { continue };
+            let Some(parts) = parts(term) else { continue };
             let sum =
                 |of: &[f64]| -> Vector2<f64> { of.iter().zip(&parts).map(|(c, p)| *c * p).sum() };
-            let whole = sum(coefficients);
+            let whole = sum(&term.coefficients);
             for (j, times) in [(1, Modulation::Disparity), (0, Modulation::One)] {
                 let constant = lift(effect, times, -whole[j], 0.0);
                 // It has the same error as the shape.

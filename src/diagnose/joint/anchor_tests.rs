@@ -133,8 +133,13 @@ fn a_curve_over_the_distance_moves_the_views_the_least() {
     let learnt = Term::bias(basis, node(&|d| ripple(d) + 1.7 - 0.08 * d));
     let factor = node(&|d| 0.3 - 0.01 * d);
     let covariance = Covariance { factors: vec![factor], ..Covariance::default() };
+    // The size of the noise may have such a curve too, and keeps it.
+    let noise = Effect {
+        shape: vec![Term::variance(learnt.basis.clone(), node(&|d| 0.1 - 0.01 * d))],
+        ..Effect::default()
+    };
     let mut added =
-        [Effect { shape: vec![learnt], covariance: Some(covariance), ..Effect::default() }];
+        [Effect { shape: vec![learnt], covariance: Some(covariance), ..Effect::default() }, noise];
     // Near views weigh more.
     let view = |d: &f64| {
         let place =
@@ -156,7 +161,8 @@ fn a_curve_over_the_distance_moves_the_views_the_least() {
         .map(view)
         .collect();
     let_distances_be(&mut added, &views);
-    let effect = &added[0];
+    let [effect, noise] = &added;
+    assert_eq!(noise.shape.len(), 1, "a term of the noise shifts no distance");
     let errors = &effect.covariance.as_ref().unwrap().factors[0];
     let mut first = 0;
     let error = |t: &Term| {
