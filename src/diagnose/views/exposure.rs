@@ -39,6 +39,7 @@ impl Field {
                 if !known.bias.is_empty() {
                     clip_px = self.spread_beside(&image, &expected, &bench.table);
                 }
+                self.pictured = readings_of_lines(&image, &bench.table);
                 edges = Edges::find(self, &image, &bench.rays, &bench.table);
                 self.subsample_blocks(&mut expected);
                 if bench.sensor.may_have_disparity() {
@@ -193,6 +194,16 @@ impl Field {
         self.frames.push((time, sum / f64::max(n, 1.0)));
         n
     }
+}
+
+/// Number of readings on each column and on each row of a picture.
+fn readings_of_lines(image: &Frame, table: &DepthTable) -> [Vec<u32>; 2] {
+    let mut lines = [image.width, image.height].map(|n| vec![0; n]);
+    for (i, _) in image.raw.iter().enumerate().filter(|(_, raw)| table.metres(**raw).is_finite()) {
+        lines[0][i % image.width] += 1;
+        lines[1][i / image.width] += 1;
+    }
+    lines
 }
 
 #[cfg(test)]

@@ -73,6 +73,8 @@ pub struct Field {
     pub words: RawHistogram,
     /// Same over the whole images, counted where the target has few distinct words.
     pub pictures: RawHistogram,
+    /// Readings of the whole first picture, by column and by row.
+    pub pictured: [Vec<u32>; 2],
     /// Whether the target's region was given; otherwise it ends where too little is measured.
     pub region_given: bool,
     /// Edges where the target ends in front of something else.

@@ -14,19 +14,22 @@ pub struct Margins {
     size: [usize; 2],
 }
 
-/// Readings of the target on one line of the picture.
+/// What one line of the picture shows in all views.
 #[derive(Debug, Clone, Copy, Default)]
 struct Line {
+    /// Readings of the targets that it should hold, and the number of views that ask for any.
     asked: usize,
+    asking: usize,
+    /// Readings of the targets, and of the whole of each first picture; and the number of views that have any.
     measured: usize,
-    /// Views that ask for any.
-    views: usize,
+    answering: usize,
 }
 
-/// Least number of target readings, all missing, for a line to count as empty. With nine in ten readings lost
-/// for another reason, one such line in 10^4 would count.
-const ASKED: usize = 100;
-/// Least number of views that ask for it: one alone may have lost it for a reason of its own.
+/// Least number of target readings, all missing, for the lines at a border to count as empty. With nine in ten
+/// readings lost for another reason, this happens once in 10^4. Also the least number of readings on the first
+/// line that answers, for the border of the sensor's picture to be there.
+const READINGS: usize = 100;
+/// Least number of views for either: one alone may have lost a line for a reason of its own.
 const VIEWS: usize = 2;
 /// Widest margin of a sensor, as a share of the picture; a wider one is reported as a loss.
 const WIDEST: f64 = 1.0 / 16.0;
@@ -36,17 +39,22 @@ impl Margins {
         let size = fields.first().map_or([0, 0], |f| [f.width, f.height]);
         let mut lines = size.map(|n| vec![Line::default(); n]);
         for f in fields {
-            let mut asks = size.map(|n| vec![false; n]);
+            let mut own = size.map(|n| vec![Line::default(); n]);
             for (&i, &measured) in f.pixels.iter().zip(&f.measured) {
                 let place = [i as usize % f.width, i as usize / f.width];
-                for ((lines, asks), at) in lines.iter_mut().zip(&mut asks).zip(place) {
+                for (lines, at) in own.iter_mut().zip(place) {
                     lines[at].asked += f.frames.len();
                     lines[at].measured += usize::from(measured);
-                    asks[at] = true;
                 }
             }
-            for (line, asks) in lines.iter_mut().flatten().zip(asks.iter().flatten()) {
-                line.views += usize::from(*asks);
+            for ((lines, own), pictured) in lines.iter_mut().zip(own).zip(&f.pictured) {
+                for ((line, own), pictured) in lines.iter_mut().zip(own).zip(pictured) {
+                    let measured = own.measured + *pictured as usize;
+                    line.asked += own.asked;
+                    line.asking += usize::from(own.asked > 0);
+                    line.measured += measured;
+                    line.answering += usize::from(measured > 0);
+                }
             }
         }
         let [columns, rows] = lines.map(|line| seen(&line));
@@ -94,12 +102,19 @@ fn seen(lines: &[Line]) -> [usize; 2] {
     [first, n.saturating_sub(1 + last)]
 }
 
-/// Lines from the border inwards, up to the last empty one before the first with a measurement. Those
-/// outside it may be asked for too seldom to tell.
-fn margin<'a>(inwards: impl Iterator<Item = &'a Line>) -> usize {
-    let empty = |line: &Line| line.asked >= ASKED && line.views >= VIEWS;
-    let silent = inwards.take_while(|line| line.measured == 0).enumerate();
-    silent.filter(|(_, line)| empty(line)).last().map_or(0, |(at, _)| at + 1)
+/// Lines from the border inwards, up to the last that is asked for before the first with a measurement; none where
+/// too little was asked to tell, unless the first that answers does so in many places.
+fn margin<'a>(inwards: impl Iterator<Item = &'a Line> + Clone) -> usize {
+    let silent = || inwards.clone().take_while(|line| line.measured == 0);
+    let first = inwards.clone().nth(silent().count());
+    let ends = first.is_some_and(|line| line.measured >= READINGS && line.answering >= VIEWS);
+    let mut asked = 0;
+    let empty = |line: &Line| {
+        asked += line.asked;
+        line.asked > 0 && (ends || asked >= READINGS && line.asking >= VIEWS)
+    };
+    let of_lines: Vec<bool> = silent().map(empty).collect();
+    of_lines.iter().rposition(|empty| *empty).map_or(0, |at| at + 1)
 }
 
 #[cfg(test)]
@@ -107,7 +122,7 @@ mod tests {
     use super::*;
 
     fn line(asked: usize, measured: usize) -> Line {
-        Line { asked, measured, views: VIEWS }
+        Line { asked, measured, asking: VIEWS, answering: VIEWS }
     }
 
     #[test]
@@ -132,7 +147,24 @@ mod tests {
         assert_eq!(seen(&lines), [0, 159], "not asked for, so nothing is known");
         lines[2] = line(500, 0);
         assert_eq!(seen(&lines), [3, 159]);
-        lines[2].views = VIEWS - 1;
-        assert_eq!(seen(&lines), [0, 159], "one view alone");
+    }
+
+    /// A polygon cut by the picture's border asks for a few pixels of each line, in one view or in some.
+    #[test]
+    fn the_corners_of_regions_ask_for_little_of_each_line() {
+        let mut lines = vec![line(500, 480); 160];
+        for (row, asked) in [76, 38, 8].into_iter().enumerate() {
+            lines[157 + row] = line(asked, 0);
+        }
+        assert_eq!(seen(&lines), [0, 156], "beside a line that answers");
+        lines[156] = line(80, 1);
+        assert_eq!(seen(&lines), [0, 156], "a hundred readings together");
+        lines[157] = line(10, 0);
+        assert_eq!(seen(&lines), [0, 159], "too little was asked");
+        lines[156] = line(500, 480);
+        lines[157..].iter_mut().for_each(|line| line.asking = 1);
+        assert_eq!(seen(&lines), [0, 156], "one view asks, and many places beside it answer");
+        lines[156].answering = 1;
+        assert_eq!(seen(&lines), [0, 159], "one view alone has both");
     }
 }
