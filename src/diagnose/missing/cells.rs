@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::odds::{bias, odds};
+use super::odds::{Counting, odds};
 use crate::camera::Camera;
 use crate::diagnose::search::rows::Rows;
 use crate::diagnose::views::layers::Survey;
@@ -13,6 +13,7 @@ use crate::diagnose::views::samples::in_patches;
 use crate::diagnose::views::surveyed_view::SurveyedView;
 use crate::diagnose::views::tiles::{SIDE, rim_px};
 use crate::solve::plane_equations;
+use crate::stats::at_least;
 use crate::terms::PixelContext;
 
 /// Pixel-frames of a patch, and how many of them have no measurement.
@@ -21,8 +22,8 @@ pub struct Cell<'a> {
     pub place: &'a PixelContext,
     pub lost: f64,
     pub asked: f64,
-    /// See [`bias`], for the share that the view usually loses.
-    pub bias: f64,
+    /// For the share that the view usually loses, and with its twin's variance.
+    pub counting: Counting,
     /// Log odds of its twin's losses above those of no loss; 0 without a twin.
     pub expected: f64,
     /// Whether it is compared with a twin and it, a neighbour or one of their twins loses something.
@@ -30,14 +31,14 @@ pub struct Cell<'a> {
 }
 
 impl Cell<'_> {
-    /// Log odds of the share lost, as counted: with their bias.
+    /// Log odds of the share lost, as counted.
     pub fn odds(&self) -> f64 {
         odds(self.lost / self.asked)
     }
 }
 
 /// A patch of many tiles, with its own place.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Patch {
     pub place: PixelContext,
     pub lost: f64,
@@ -47,12 +48,12 @@ pub struct Patch {
 /// Converts the patches to cells. In each view so many readings are lost `together`.
 pub fn cells<'a>(patches: &'a [Vec<Patch>], together: &[f64]) -> Vec<Vec<Cell<'a>>> {
     fn of_view(view: &[Patch], together: f64) -> Vec<Cell<'_>> {
-        let usual = usual_share(view);
+        let usual = usual_share(view, together);
         let cell = |&Patch { ref place, lost, asked }| Cell {
             place,
             lost,
             asked,
-            bias: bias(usual, asked, together),
+            counting: Counting::of(usual, asked, together),
             expected: 0.0,
             differs: false,
         };
@@ -61,9 +62,15 @@ pub fn cells<'a>(patches: &'a [Vec<Patch>], together: &[f64]) -> Vec<Vec<Cell<'a
     patches.iter().zip(together).map(|(view, together)| of_view(view, *together)).collect()
 }
 
-/// Median of the patches' shares, weighted by the readings asked for: a clump does not move it. Where most patches
-/// lose nothing, the share of all.
-fn usual_share(view: &[Patch]) -> f64 {
+/// Patches that lose more than chance brings this often are clumps.
+const CHANCE: f64 = 1e-3;
+/// Rounds that leave clumps out; the second hardly changes anything.
+const ROUNDS: usize = 3;
+
+/// Share that the patches lose, without clumps: from their median, weighted by the readings asked for, or from the
+/// share of all where most lose nothing. The median alone is one of whole counts: off by a third where a patch
+/// loses one or two.
+pub fn usual_share(view: &[Patch], together: f64) -> f64 {
     let mut shares: Vec<[f64; 2]> = view.iter().map(|p| [p.lost / p.asked, p.asked]).collect();
     shares.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut left = 0.5 * shares.iter().map(|s| s[1]).sum::<f64>();
@@ -71,11 +78,21 @@ fn usual_share(view: &[Patch]) -> f64 {
         left -= asked;
         left <= 0.0
     });
-    let of_all = || {
-        let [lost, asked] = view.iter().fold([0.0; 2], |s, p| [s[0] + p.lost, s[1] + p.asked]);
-        if asked > 0.0 { lost / asked } else { 0.0 }
+    let share_of = |kept: &dyn Fn(&&Patch) -> bool| {
+        let kept = view.iter().filter(kept);
+        let [lost, asked] = kept.fold([0.0; 2], |s, p| [s[0] + p.lost, s[1] + p.asked]);
+        (asked > 0.0).then(|| lost / asked)
     };
-    middle.map(|s| s[0]).filter(|share| *share > 0.0).unwrap_or_else(of_all)
+    let events = |readings: f64| (readings / together).round() as usize;
+    let mut share = middle.map_or(0.0, |s| s[0]);
+    if share == 0.0 {
+        share = share_of(&|_| true).unwrap_or(0.0);
+    }
+    for _ in 0..ROUNDS {
+        let chance = |p: &&Patch| at_least(events(p.lost), events(p.asked), share) > CHANCE;
+        share = share_of(&chance).unwrap_or(share);
+    }
+    share
 }
 
 /// Cells across the picture: about a hundred a view, each wider than a clump of dead pixels.
@@ -120,13 +137,14 @@ pub fn set_expected(cells: &mut [Vec<Cell<'_>>], twins: &[Vec<Cell<'_>>], rim: f
     for (mine, theirs) in cells.iter_mut().zip(twins) {
         let theirs: BTreeMap<_, _> = theirs
             .iter()
-            .map(|c| (key(c, rim), (c.odds() - c.bias - odds(0.0), c.lost > 0.0)))
+            .map(|c| (key(c, rim), (c.odds() - c.counting.bias - odds(0.0), c)))
             .collect();
         let mut loses = Vec::new();
         mine.retain_mut(|c| {
-            let Some((expected, lost)) = theirs.get(&key(c, rim)) else { return false };
+            let Some((expected, twin)) = theirs.get(&key(c, rim)) else { return false };
             c.expected = *expected;
-            loses.push(*lost || c.lost > 0.0);
+            c.counting.variance += twin.counting.variance;
+            loses.push(twin.lost > 0.0 || c.lost > 0.0);
             true
         });
         // A clump seen in one run could have lain next to it in the other.
@@ -143,7 +161,8 @@ pub fn fine<'a>(survey: &'a Survey, margins: &Margins) -> Vec<Vec<Cell<'a>>> {
         let held = v.patches().filter(|(place, _)| margins.hold(place));
         held.map(|(place, t)| {
             let (lost, asked) = (t.asked * t.missing, t.asked);
-            Cell { place, lost, asked, bias: 0.0, expected: 0.0, differs: false }
+            let counting = Counting::default();
+            Cell { place, lost, asked, counting, expected: 0.0, differs: false }
         })
         .collect()
     };
@@ -157,7 +176,7 @@ pub struct Scatter {
     pub level: f64,
     /// Of a view's slope across the picture, per unit of normalised coordinate.
     pub slope: f64,
-    /// Of a cell.
+    /// Of a cell, beyond counting.
     pub cell: f64,
     /// Of a cell compared with a twin where either, or a neighbour, loses something. Clumps lie elsewhere in
     /// every run, and where neither loses anything there is no scatter.
@@ -181,7 +200,8 @@ impl Scatter {
     /// A view's log odds, weighted, with its level and slopes as nuisances.
     pub fn rows(&self, cells: &[Cell<'_>], left: &[f64]) -> Option<Rows<'static>> {
         let of = |c: &Cell<'_>| if c.differs { self.differing } else { self.cell };
-        let weights: Vec<f64> = cells.iter().map(|c| 1.0 / (self.clump * of(c))).collect();
+        let variance = |c: &Cell<'_>| self.clump * of(c) + c.counting.variance;
+        let weights: Vec<f64> = cells.iter().map(|c| variance(c).recip()).collect();
         let plane: Vec<f64> = cells.iter().flat_map(|c| [1.0, c.place.x, c.place.y]).collect();
         let precision = [self.level, self.slope, self.slope].map(f64::recip);
         Rows::new(left, weights, &plane, precision.len(), &precision)
@@ -204,7 +224,7 @@ impl Scatter {
             let off: Vec<f64> = cells.iter().zip(left).map(|(c, y)| y - plane(c)).collect();
             for (cell, y) in cells.iter().zip(&off) {
                 let kind = 2 + usize::from(cell.differs);
-                sums[kind] += y * y;
+                sums[kind] += y * y - cell.counting.variance;
                 n[kind] += 1.0;
             }
             neighbours.add(cells, &off);

@@ -13,7 +13,6 @@ use crate::diagnose::search::noise_gains::NoiseGains;
 use crate::diagnose::search::null::Null;
 use crate::diagnose::search::rows::Rows;
 use crate::rng::Seed;
-use crate::stats::{mean, median};
 use crate::terms::Basis;
 
 /// Prior precision of a step's size about the whole step: 1 ± 0.5.
@@ -62,21 +61,13 @@ pub fn predicted(a: &[f64], b: &[f64]) -> (f64, f64) {
 /// Median share lost from which only the best cells show what is lost anyway.
 const MUCH: f64 = 0.1;
 
-/// Log odds of the share lost everywhere.
-fn usual(odds: &[Vec<f64>]) -> f64 {
-    let mut all: Vec<f64> = odds.iter().flatten().copied().collect();
+/// Log odds of the share lost everywhere. A median of counts is a whole one, so each is compared with its own.
+fn usual(odds: &[Vec<f64>], views: &[Vec<Cell<'_>>]) -> f64 {
+    let all = odds.iter().flatten().zip(views.iter().flatten());
+    let mut all: Vec<f64> = all.map(|(odds, c)| odds - c.counting.median).collect();
     all.sort_by(f64::total_cmp);
     let at = |q: f64| all.get((q * all.len() as f64) as usize).copied().unwrap_or(0.0);
     if share(at(0.5)) < MUCH { at(0.5) } else { at(0.1) }
-}
-
-/// Same where most patches lose nothing, and their median shows nothing of single losses: the middle one of the
-/// views' means, without the bias of their counts.
-fn usual_of_few(odds: &[Vec<f64>], views: &[Vec<Cell<'_>>]) -> f64 {
-    let of_view = |(odds, cells): (&Vec<f64>, &Vec<Cell<'_>>)| {
-        mean(odds.iter().zip(cells).map(|(odds, c)| odds - c.bias))
-    };
-    median(&mut odds.iter().zip(views).filter_map(of_view).collect::<Vec<f64>>())
 }
 
 /// Gain (nats) and coefficients of a shape of this evidence.
@@ -103,13 +94,9 @@ impl<'a> Losses<'a> {
             .zip(explained)
             .map(|(cells, e)| cells.iter().zip(e).map(|(c, e)| c.odds() - e).collect())
             .collect();
-        // A median of counts has no bias.
-        let level = match usual(&left) {
-            level if level > odds(0.0) => level,
-            _ => usual_of_few(&left, views).max(odds(0.0)),
-        };
+        let level = usual(&left, views).max(odds(0.0));
         for (y, c) in left.iter_mut().flatten().zip(views.iter().flatten()) {
-            *y -= c.bias + level;
+            *y -= c.counting.bias + level;
         }
         Losses::scattered(views, left, share(level), USUAL)
     }

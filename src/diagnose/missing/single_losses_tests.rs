@@ -2,8 +2,24 @@
 
 use rand_distr::{Binomial, Distribution};
 
+use super::cells::{Patch, usual_share};
 use super::tests::{find, session};
 use crate::rng::Seed;
+
+/// A patch loses one reading or two: its median share is a quarter too small or too large. A tenth of the patches
+/// is lost whole.
+#[test]
+fn the_usual_share_is_no_whole_count_and_no_clump() {
+    let mut rng = Seed(1).stream("missing/usual");
+    let count = Binomial::new(800, 0.002).unwrap();
+    let patch = |k: usize| {
+        let lost = if k % 10 == 0 { 800.0 } else { count.sample(&mut rng) as f64 };
+        Patch { lost, asked: 800.0, ..Patch::default() }
+    };
+    let patches: Vec<Patch> = (0..400).map(patch).collect();
+    // 576 readings are lost by chance: 4 %.
+    assert!((usual_share(&patches, 1.0) / 0.002 - 1.0).abs() < 0.12);
+}
 
 /// One frame a view: a patch of 400 pixels loses one reading or none, one at the border of 100 hardly any. All
 /// lose the same share.
