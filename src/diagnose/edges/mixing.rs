@@ -15,8 +15,9 @@ use crate::terms::{Axis, Statistic};
 const TRIED_PX: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 /// Widths tried to estimate how far, px.
 const WIDTHS_PX: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
-/// Too few views to show a rule.
+/// Too few views to show a rule, and to show it once they are known to differ from the others.
 const TOO_FEW_VIEWS: f64 = 2.0;
+const TOO_FEW_OF_SOME: f64 = 1.0;
 /// Widest footprint that is reported, px: the catalogue's limit.
 const WIDEST_PX: f64 = 32.0;
 
@@ -110,9 +111,14 @@ type Footprint = (f64, (ViewMean, f64));
 
 /// Width that explains the views best. Of equally good ones, such as 1 and 1.5 px, which both reach one
 /// pixel, the narrowest.
-fn best(edges: &[&Edges], twins: Option<&[&Edges]>, widths: &[f64]) -> Option<Footprint> {
+fn best(
+    edges: &[&Edges],
+    twins: Option<&[&Edges]>,
+    widths: &[f64],
+    too_few: f64,
+) -> Option<Footprint> {
     let at = |w: &f64| Some((*w, mean_share(edges, twins, *w)?));
-    let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > TOO_FEW_VIEWS);
+    let seen = widths.iter().filter_map(at).filter(|(_, (m, _))| m.views > too_few);
     const ROUNDING: f64 = 1e-9;
     seen.reduce(|a, b| if b.1.1 - a.1.1 > ROUNDING * a.1.1.abs() { b } else { a })
 }
@@ -122,7 +128,7 @@ fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, usize, f64)>
     let at = |width: &f64| {
         let sure = |e: &&'a Edges| share(e, *width).map(|(value, sure)| (*e, value * sure.sqrt()));
         let (seen, off): (Vec<&Edges>, Vec<f64>) = edges.iter().filter_map(sure).unzip();
-        let some = SomeViews::above(&off)?;
+        let some = SomeViews::above_error(&off)?;
         Some((some.which.iter().map(|&v| seen[v]).collect::<Vec<_>>(), seen.len(), some.p))
     };
     TRIED_PX.iter().filter_map(at).min_by(|a, b| a.2.total_cmp(&b.2))
@@ -134,14 +140,16 @@ pub fn mixing(fields: &[Field], twins: Option<&[Field]>, level: f64) -> Option<T
     let twins: Option<Vec<&Edges>> = twins.map(|t| t.iter().map(|f| &f.edges).collect());
     let twins = twins.as_deref();
     let tried = TRIED_PX.len() as f64;
-    let p = (tried * best(&edges, twins, &TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
+    let best_of_all = |widths: &[f64]| best(&edges, twins, widths, TOO_FEW_VIEWS);
+    let p = (tried * best_of_all(&TRIED_PX)?.1.0.p_above(0.0)).min(1.0);
     if p <= level {
-        return found(&edges, best(&edges, twins, &WIDTHS_PX)?, p);
+        return found(&edges, best_of_all(&WIDTHS_PX)?, p);
     }
     // This is the second test at the level.
     let (some, of, p) = twins.is_none().then(|| mixing_views(&edges)).flatten()?;
     let p = 2.0 * tried * p;
-    let footprint = (p <= level).then(|| best(&some, None, &WIDTHS_PX)).flatten()?;
+    let best_of_some = || best(&some, None, &WIDTHS_PX, TOO_FEW_OF_SOME);
+    let footprint = (p <= level).then(best_of_some).flatten()?;
     Some(found(&some, footprint, p)?.of_some([some.len(), of], p))
 }
 

@@ -6,11 +6,13 @@ use super::structure::Structure;
 use super::view_mean::Weight;
 use crate::stats::{at_least, normal_beyond, student_upper};
 
-/// Fewer views than this, or than this share of all, are outliers.
+/// Fewer views than this, or than this share of all, may be outliers.
 const MIN_VIEWS: usize = 3;
 const MIN_SHARE: f64 = 0.2;
+/// Fewest views that are tested as outliers: a single one has a reason of its own.
+pub const FEWEST: usize = 2;
 /// With fewer views below the expected value their scatter is unknown: with two, half of it is chance. The
-/// views' own error then counts as this many views.
+/// views' own error, where it is known, counts as this many views.
 const MIN_BELOW: usize = 3;
 /// Any further view is included where its p-value is below this.
 const CLEAR: f64 = 0.01;
@@ -30,20 +32,18 @@ impl SomeViews {
     /// Tests the deviations of the views, all in one unit. Without an effect they scatter symmetrically, so
     /// those below zero give the scale.
     pub fn above(off: &[f64]) -> Option<Self> {
-        let below = || off.iter().filter(|t| **t < 0.0);
-        let n = below().count();
-        let scale = (below().map(|t| t * t).sum::<f64>() / n as f64).sqrt();
+        let (n, squares) = below(off);
+        let scale = (squares / n as f64).sqrt();
         (n >= MIN_BELOW && scale > 0.0).then(|| SomeViews::beyond(off, scale, n))?
     }
 
-    /// Tests deviations in units of each view's own error, for too few views below zero to give the scale:
-    /// where most views show the effect.
+    /// Tests deviations in units of each view's own error. Few may lie below zero: where most views show the
+    /// effect, or few views were recorded.
     pub fn above_error(off: &[f64]) -> Option<Self> {
-        let below = off.iter().filter(|t| **t < 0.0);
-        let (n, squares) = below.fold((0, 0.0), |(n, sum), t| (n + 1, sum + t * t));
+        let (n, squares) = below(off);
         let freedom = n + MIN_BELOW;
         let scale = ((squares + MIN_BELOW as f64) / freedom as f64).sqrt();
-        (n < MIN_BELOW).then(|| SomeViews::beyond(off, scale, freedom))?
+        SomeViews::beyond(off, scale, freedom)
     }
 
     /// Tests deviations with a standard error of `scale`, known with `freedom` degrees of freedom.
@@ -51,14 +51,24 @@ impl SomeViews {
         let above = |v: &usize| off[*v] > 0.0;
         let mut which: Vec<usize> = (0..off.len()).filter(above).collect();
         which.sort_by(|a, b| off[*b].total_cmp(&off[*a]));
-        let (min, n) = (min_views(off.len()), which.len());
-        let p = order_statistic(off[*which.get(min - 1)?] / scale, min, n, freedom);
+        let n = which.len();
+        let tests = [min_views(off.len()), FEWEST];
+        let test =
+            |k: usize| Some((k, order_statistic(off[*which.get(k - 1)?] / scale, k, n, freedom)));
+        let best = tests.into_iter().filter_map(test).min_by(|a, b| a.1.total_cmp(&b.1));
+        let (min, p) = best.map(|(k, p)| (k, (tests.len() as f64 * p).min(1.0)))?;
         let sure = |v: &&usize| student_upper(off[**v] / scale, freedom as f64) < CLEAR;
         let clear = which.iter().filter(sure).count();
         which.truncate(clear.max(min));
         which.sort_unstable();
         Some(SomeViews { which, p })
     }
+}
+
+/// Number of values below zero, and the sum of their squares.
+fn below(off: &[f64]) -> (usize, f64) {
+    let below = off.iter().filter(|t| **t < 0.0);
+    below.fold((0, 0.0), |(n, sum), t| (n + 1, sum + t * t))
 }
 
 /// Views that lie above the others, the number of views measured, and the p-value.
@@ -84,8 +94,10 @@ pub fn some_views(
         let off: Vec<f64> = values.iter().zip(&which).map(|((x, _), s)| x / error(s)).collect();
         SomeViews::above_error(&off)
     };
-    let SomeViews { which: these, p } =
-        SomeViews::above(&off).or_else(|| error.and_then(by_error))?;
+    let both = [SomeViews::above(&off), error.and_then(by_error)];
+    let tests = both.iter().flatten().count() as f64;
+    let best = both.into_iter().flatten().min_by(|a, b| a.p.total_cmp(&b.p))?;
+    let SomeViews { which: these, p } = SomeViews { p: (tests * best.p).min(1.0), ..best };
     let views = these.into_iter().map(|v| which[v].clone()).collect();
     Some(Above { views, of: which.len(), p })
 }
@@ -168,6 +180,11 @@ mod tests {
         }
         // In 44 of 50 +- 2.3: the others have few views below zero, which say little of the views' scatter.
         assert!(clear >= 36, "{clear} of 50");
+        // Two of 20 are a tenth; they lie farther off than outliers do.
+        for _ in 0..20 {
+            let found = SomeViews::above(&views(20, 2, 30.0, &mut rng));
+            assert!(found.is_some_and(|s| s.p < 1e-3 && s.which[..2] == [0, 1]));
+        }
         let odd = views(20, 1, 100.0, &mut rng);
         assert!(SomeViews::above(&odd).is_none_or(|s| s.p > 1e-3));
         // As many views below the others are no effect.
