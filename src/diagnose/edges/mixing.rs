@@ -128,7 +128,7 @@ fn mixing_views<'a>(edges: &[&'a Edges]) -> Option<(Vec<&'a Edges>, usize, f64)>
     let at = |width: &f64| {
         let sure = |e: &&'a Edges| share(e, *width).map(|(value, sure)| (*e, value * sure.sqrt()));
         let (seen, off): (Vec<&Edges>, Vec<f64>) = edges.iter().filter_map(sure).unzip();
-        let some = SomeViews::above_error(&off)?;
+        let some = SomeViews::above(&off)?;
         Some((some.which.iter().map(|&v| seen[v]).collect::<Vec<_>>(), seen.len(), some.p))
     };
     TRIED_PX.iter().filter_map(at).min_by(|a, b| a.2.total_cmp(&b.2))

@@ -141,8 +141,8 @@ mod tests {
         }
     }
 
-    /// With their own error, known with three degrees of freedom: in one of two sessions of five views fewer
-    /// than three lie below zero, and one in a hundred of these is found at that level: 100 of 20,000 +- 10.
+    /// With their own error, known with three degrees of freedom, five views: one in a hundred would be 200 of
+    /// 20,000 +- 14, half of it by either number of views; three of five are seldom above zero.
     #[test]
     fn clean_views_are_found_by_their_own_error_as_often_as_the_level_says() {
         let mut rng = Seed(6).stream("some-views/own-error");
@@ -164,10 +164,9 @@ mod tests {
             views(12, tall, 15.0, &mut rng).into_iter().map(|x| 100.0 * x).collect()
         };
         let told = (0..200).filter_map(|_| SomeViews::above_error(&off(9)));
-        let told = told.filter(|s| s.p < 1e-4 && s.which.len() == 9).count();
-        // In 7 of 8 sessions none, one or two of the three others lie below zero; in one in ten of these a
-        // tenth view has a p-value below 0.01, or the scale is wide.
-        assert!((120..=175).contains(&told), "{told} of 200");
+        let told = told.filter(|s| s.p < 1e-3 && s.which.len() == 9).count();
+        // In one session in ten a tenth view has a p-value below 0.01, or the scale is wide.
+        assert!((160..=195).contains(&told), "{told} of 200");
     }
 
     #[test]
