@@ -61,6 +61,13 @@ struct Best {
     next: f64,
 }
 
+impl Best {
+    /// Whether these views, and no others, have a cause; `threshold` is that of a gain.
+    fn is_cause(&self, threshold: f64) -> bool {
+        self.agreed || self.next < f64::max(threshold, APART * self.gain)
+    }
+}
+
 /// One candidate's evidence, view by view, divided by the views' dispersion.
 struct Tried<'a> {
     candidate: &'a Candidate,
@@ -194,8 +201,7 @@ pub fn few_views(
     let nameless = outcome.chosen.iter().filter(|c| c.candidate.family.is_none());
     let (told, names) = told(&all, nameless.map(|c| c.gain).fold(0.0, f64::max))?;
     let best = &told.1;
-    let apart = best.next < f64::max(threshold, APART * best.gain);
-    (best.agreed || apart).then(|| report(scene, told, &names, noise.p(best.gain)))
+    best.is_cause(threshold).then(|| report(scene, told, &names, noise.p(best.gain)))
 }
 
 /// No name is reported if more than these explain it.

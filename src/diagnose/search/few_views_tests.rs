@@ -69,7 +69,7 @@ fn noise_brings_less_than_the_choice_costs() {
 fn views_with_errors_of_their_own_have_no_cause_in_common() {
     let slope =
         Candidate::named("column-banding", Basis::powers(Coordinate::Column, 2, Modulation::One));
-    let agreed = |errors: &[[f64; 2]]| {
+    let best = |errors: &[[f64; 2]]| {
         let mut rng = Seed(9).stream("few-views/agreed");
         let mut one = |v: usize| {
             let beta = errors.get(v).copied().unwrap_or_default();
@@ -77,12 +77,18 @@ fn views_with_errors_of_their_own_have_no_cause_in_common() {
             let b = 100.0 * DVector::from_row_slice(&beta) + 10.0 * white;
             Evidence { a: DMatrix::identity(2, 2) * 100.0, b }
         };
-        let found = Tried::of(&slope, (0..18).map(&mut one).collect(), 0.1, 1.0).unwrap().best();
-        found.is_some_and(|best| best.views.len() <= errors.len() && best.agreed)
+        Tried::of(&slope, (0..18).map(&mut one).collect(), 0.1, 1.0).unwrap().best().unwrap()
+    };
+    let agreed = |errors: &[[f64; 2]]| {
+        let best = best(errors);
+        best.views.len() <= errors.len() && best.agreed
     };
     assert!(agreed(&[[1.0, 0.5]; 3]));
     assert!(!agreed(&[[1.0, 0.5]]));
     assert!(!agreed(&[[1.5, 0.0], [0.0, 1.5], [-1.0, 1.0]]));
+    // A view that is off alone has a cause; the largest of many that are off has none of its own.
+    assert!(best(&[[1.5, 0.0]]).is_cause(15.0));
+    assert!(!best(&[[1.5, 0.0], [0.0, 1.1], [-0.9, 0.9], [0.8, -0.8]]).is_cause(15.0));
 }
 
 /// Bands that a curve over distance explains as well have no name; they keep it where only a curve over
@@ -94,7 +100,7 @@ fn a_name_is_better_than_curves_on_other_axes() {
     let bands = Candidate::named("column-banding", columns.clone());
     let [own, other] = [columns, distance].map(Candidate::curve);
     let found = |candidate, gain| {
-        (candidate, Best { gain, views: vec![3], beta: DVector::zeros(6), agreed: true })
+        (candidate, Best { gain, views: vec![3], beta: DVector::zeros(6), agreed: true, next: 0.0 })
     };
     let name_of = |all: &[_], nameless| told(all, nameless).unwrap().1.first().copied();
     let cases = [
@@ -121,7 +127,7 @@ fn what_many_causes_explain_has_no_name() {
         ["slope-noise", "range-exponent", "tilt-axis-anisotropy", "ambient-light"].map(level);
     let curve = Candidate::ring(Coordinate::Column, 1.0, 8);
     let found = |candidate, gain| {
-        (candidate, Best { gain, views: vec![3], beta: DVector::zeros(1), agreed: true })
+        (candidate, Best { gain, views: vec![3], beta: DVector::zeros(1), agreed: true, next: 0.0 })
     };
     let with = |causes| -> Vec<(&Candidate, Best)> {
         let causes: &[Candidate] = causes;
