@@ -13,7 +13,7 @@ fn the_usual_share_is_no_whole_count_and_no_clump() {
     let mut rng = Seed(1).stream("missing/usual");
     let count = Binomial::new(800, 0.002).unwrap();
     let patch = |k: usize| {
-        let lost = if k % 10 == 0 { 800.0 } else { count.sample(&mut rng) as f64 };
+        let lost = if k.is_multiple_of(10) { 800.0 } else { count.sample(&mut rng) as f64 };
         Patch { lost, asked: 800.0, ..Patch::default() }
     };
     let patches: Vec<Patch> = (0..400).map(patch).collect();
