@@ -6,7 +6,7 @@
 use super::{EdgeLoss, Edges};
 use crate::diagnose::checks::replication::agree;
 use crate::diagnose::diagnosis::Curve;
-use crate::diagnose::noise::some_views::SomeViews;
+use crate::diagnose::noise::some_views::{SomeViews, min_views};
 use crate::diagnose::noise::view_mean::ViewMean;
 use crate::diagnose::search::null::student;
 use crate::stats::student_upper;
@@ -108,7 +108,9 @@ fn shaded_views(views: &[Sides], side: usize) -> Option<Band> {
     let seen: Vec<(Sides, EdgeLoss)> =
         views.iter().filter_map(|s| Some((*s, s.0[side]?))).collect();
     let widths: Vec<f64> = seen.iter().map(|(_, v)| v.lost / v.rows).collect();
-    let some = SomeViews::beyond(&widths, BORDER_PX, OF_A_CONSTANT)?;
+    // Two views are too few for a share.
+    let counts = [min_views(widths.len())];
+    let some = SomeViews::beyond(&widths, BORDER_PX, OF_A_CONSTANT, &counts)?;
     let shaded: Vec<Sides> = some.which.iter().map(|&v| seen[v].0).collect();
     let p = (some.p / SHARES[1]).min(1.0);
     let of_some = Some([shaded.len(), seen.len()]);

@@ -64,7 +64,7 @@ pub fn cells<'a>(patches: &'a [Vec<Patch>], together: &[f64]) -> Vec<Vec<Cell<'a
 
 /// Patches that lose more than chance brings this often are clumps.
 const CHANCE: f64 = 1e-3;
-/// Rounds that leave clumps out; the second hardly changes anything.
+/// Rounds that leave clumps out: from the share of all, first what is lost whole, then what is lost in part.
 const ROUNDS: usize = 3;
 
 /// Share that the patches lose, without clumps: from their median, weighted by the readings asked for, or from the

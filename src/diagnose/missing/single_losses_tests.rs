@@ -6,8 +6,8 @@ use super::cells::{Patch, usual_share};
 use super::tests::{find, session};
 use crate::rng::Seed;
 
-/// A patch loses one reading or two: its median share is a quarter too small or too large. A tenth of the patches
-/// is lost whole.
+/// A patch of 800 readings loses one or two: the median share is 0.00125 or 0.0025. A tenth of the patches is lost
+/// whole.
 #[test]
 fn the_usual_share_is_no_whole_count_and_no_clump() {
     let mut rng = Seed(1).stream("missing/usual");

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{DiscreteCDF, Poisson};
 
-use super::some_views::{Above, FEWEST, min_views};
+use super::some_views::{Above, MIN_OUTLIERS, counts, least_likely};
 use super::structure::Structure;
 use super::tail_counts::{MIN_READINGS, TAIL_EDGES};
 use crate::stats::{at_least, normal_beyond};
@@ -11,14 +11,14 @@ use crate::stats::{at_least, normal_beyond};
 const CLEAR: f64 = 1e-3;
 
 /// Views with tails that the others do not have: those whose share beyond four sigma is above `heavy`, if there
-/// are at least [`FEWEST`] of them. Noise alone has a share of up to `expected`.
+/// are at least [`MIN_OUTLIERS`] of them. Noise alone has a share of up to `expected`.
 pub fn tailed_views(views: &[Structure], expected: f64, heavy: f64) -> Option<Above> {
     let looked: Vec<&Structure> = views.iter().filter(|s| s.tails.n > MIN_READINGS).collect();
     let tailed = |s: &&&Structure| {
         s.tails.share() > heavy * bent(s) && chance(s, expected).is_some_and(|p| p < CLEAR)
     };
     let tailed: Vec<Structure> = looked.iter().filter(tailed).map(|s| (*s).clone()).collect();
-    if tailed.len() < FEWEST {
+    if tailed.len() < MIN_OUTLIERS {
         return None;
     }
     let p = order_statistic(&looked, expected)?;
@@ -45,18 +45,16 @@ fn chance(view: &Structure, expected: f64) -> Option<f64> {
     Some((view.far_places as u64).checked_sub(1).map_or(1.0, |fewer| poisson.sf(fewer)))
 }
 
-/// P-value of the [`min_views`]-th or the [`FEWEST`]-th smallest of the views' p-values.
+/// P-value of the smallest of the views' p-values, in as many views as any of the [`counts`].
 fn order_statistic(views: &[&Structure], expected: f64) -> Option<f64> {
     let all = views.iter().filter_map(|s| chance(s, expected));
     let mut chances: Vec<f64> = all.collect();
     chances.sort_by(f64::total_cmp);
-    let of = |k: usize| {
+    let (_, p) = least_likely(&counts(views.len()), |k| {
         let p = chances.get(k - 1)?.clamp(0.0, 1.0);
         Some(at_least(k, chances.len(), p))
-    };
-    let tests = [min_views(views.len()), FEWEST];
-    let best = tests.into_iter().filter_map(of).reduce(f64::min)?;
-    Some((tests.len() as f64 * best).clamp(1e-300, 1.0))
+    })?;
+    Some(p.max(1e-300))
 }
 
 #[cfg(test)]

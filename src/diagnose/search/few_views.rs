@@ -98,12 +98,11 @@ fn best(views: &[Evidence], prior: f64) -> Option<Best> {
         let gain = nats - ln_binomial(n as u64, count as u64) - 0.5 * k as f64;
         if best.as_ref().is_none_or(|b| gain > b.gain) {
             let views = order[..count].iter().map(|o| o.1).collect();
-            best = Some(Best { gain, views, beta, agreed: false, next: 0.0 });
+            let next = order[count].0 - (n as f64).ln() - 0.5 * k as f64;
+            best = Some(Best { gain, views, beta, agreed: false, next });
         }
     }
-    let mut best = best?;
-    best.next = order[best.views.len()].0 - (n as f64).ln() - 0.5 * k as f64;
-    Some(best)
+    best
 }
 
 impl<'a> Tried<'a> {

@@ -39,7 +39,8 @@ impl Margins {
         let size = fields.first().map_or([0, 0], |f| [f.width, f.height]);
         let mut lines = size.map(|n| vec![Line::default(); n]);
         for f in fields {
-            let mut own = size.map(|n| vec![Line::default(); n]);
+            let pictured = |&n: &u32| Line { measured: n as usize, ..Line::default() };
+            let mut own = f.pictured.each_ref().map(|n| n.iter().map(pictured).collect::<Vec<_>>());
             for (&i, &measured) in f.pixels.iter().zip(&f.measured) {
                 let place = [i as usize % f.width, i as usize / f.width];
                 for (lines, at) in own.iter_mut().zip(place) {
@@ -47,14 +48,11 @@ impl Margins {
                     lines[at].measured += usize::from(measured);
                 }
             }
-            for ((lines, own), pictured) in lines.iter_mut().zip(own).zip(&f.pictured) {
-                for ((line, own), pictured) in lines.iter_mut().zip(own).zip(pictured) {
-                    let measured = own.measured + *pictured as usize;
-                    line.asked += own.asked;
-                    line.asking += usize::from(own.asked > 0);
-                    line.measured += measured;
-                    line.answering += usize::from(measured > 0);
-                }
+            for (line, own) in lines.iter_mut().flatten().zip(own.iter().flatten()) {
+                line.asked += own.asked;
+                line.asking += usize::from(own.asked > 0);
+                line.measured += own.measured;
+                line.answering += usize::from(own.measured > 0);
             }
         }
         let [columns, rows] = lines.map(|line| seen(&line));
