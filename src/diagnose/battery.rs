@@ -11,7 +11,7 @@ use super::echoes::{echoes, fold_into_sigma, forget_noise_of_frames};
 use super::edges::mixing::mixing;
 use super::finding::findings;
 use super::finding::form::better_form;
-use super::finding::naming::{doubt_beside_the_unexplained, finish};
+use super::finding::naming::{doubt_beside_the_unexplained, doubt_where_halves_disagree, finish};
 use super::finding::other_findings;
 use super::finding::pixels::{typical_sigma_mm, typical_sigma_px};
 use super::finding::scene::Scene;
@@ -143,6 +143,7 @@ impl Case<'_> {
         echoes(&mut found);
         merge(&mut found);
         doubt_beside_the_unexplained(&mut found);
+        doubt_where_halves_disagree(&mut found);
         found.iter_mut().for_each(finish);
         Battery { mean, scatter, found, refitted, better_form, ends, detectable_losses }
     }

@@ -192,7 +192,10 @@ impl DropoutSearch<'_> {
                 let finding = reporter.finding(won, &rivals, TESTS * p);
                 Finding { replicated: ledger.replicate(won, &seen.second), ..finding }
             };
-            let finding = told(won);
+            // Losses that a step predicts but do not rise as one belong to the curve that predicts them better.
+            let (step, curve) = (told(won), judged.iter().find(|j| j.shape.family().is_none()));
+            let better = curve.filter(|c| step.effect.is_none() && c.gain > won.gain);
+            let (won, finding) = better.map_or((won, step), |curve| (curve, told(curve)));
             let end = self.end(&finding, ledger.base);
             if let Some(end) = end.as_ref().filter(|e| touches(views, e)) {
                 return self.within(end, seen);

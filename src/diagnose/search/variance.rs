@@ -25,12 +25,15 @@ pub fn beyond_sigma(candidate: &Candidate) -> bool {
     !candidate.basis.is_of_sigma()
 }
 
-/// Free refit of sigma's level and form.
+/// Free refit of sigma's level and form. Where noise across the plane is added to noise along the axis, one of them
+/// the larger from some distance on, each function of the tilt changes with the distance as a cubic, nearly.
 pub fn refit(reach: &Extent) -> Candidate {
     surface(reach, &|l, t| {
         let u = steepness(t);
         let w = t * t;
-        vec![1.0, l, l * l, l.powi(3), l.powi(4), u, w, u * u, u * l, w * l, u * l * l, w * l * l]
+        let level = [1.0, l, l * l, l.powi(3), l.powi(4)];
+        let tilt = [u, w, u * u].map(|t| [t, t * l, t * l * l, t * l.powi(3)]);
+        level.into_iter().chain(tilt.into_iter().flatten()).collect()
     })
 }
 
