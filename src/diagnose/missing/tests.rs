@@ -261,6 +261,16 @@ fn what_begins_in_the_midst_of_the_session_is_told_with_its_time() {
 }
 
 /// A band of rows has no name, but it is located.
+#[test]
+fn rows_that_fail_are_told_by_their_axis() {
+    let mut rng = Seed(4).stream("rows");
+    let (views, camera) =
+        session(0.001, &mut rng, |p| if (200.0..280.0).contains(&p.v) { 0.1 } else { 0.0 });
+    let first = &find(&views, &camera, Seed(4)).findings[0];
+    assert_eq!((first.effect, first.axis), (None, Axis::Row));
+    assert!(first.interval[0] > 150.0 && first.interval[1] < 330.0, "{:?}", first.interval);
+}
+
 /// Seeds with a false alarm. 0, 1 or 2 % is lost on average, in clumps, by a factor of e more or less from
 /// view to view.
 fn alarms(seeds: std::ops::Range<u64>) -> Vec<u64> {
