@@ -59,22 +59,24 @@ pub fn doubt_beside_the_unexplained(found: &mut [Finding]) {
     let nameless = |f: &&Finding| of_picture(f) && f.status == Status::Unexplained && smooth(f);
     let left: f64 = found.iter().filter(nameless).map(|f| f.share).sum();
     for f in found.iter_mut().filter(|f| of_picture(f) && f.share > 0.0) {
-        let sure = f.share / (f.share + left);
-        f.alternatives.iter_mut().for_each(|a| a.probability = a.probability.map(|p| p * sure));
+        less_sure(f, f.share / (f.share + left));
     }
 }
 
 /// Probability that a name of the mean error is right where the two halves of the views do not agree on its size:
-/// a cause has one size. Of five such names in a trial (400 sets, seed 20261213) and 24 halves of a real Kinect's
-/// views, three were right; by Jeffreys's prior.
+/// a cause has one size. Of five such names with a probability in a trial (400 sets, seed 20261213) and 24 halves of
+/// a real Kinect's views, three were right; by Jeffreys's prior.
 const SURE_OF_DISAGREEING_HALVES: f64 = (3.0 + 0.5) / (5.0 + 1.0);
 
 /// Lowers the probability of names of the mean error that the two halves of the views do not bear out.
 pub fn doubt_where_halves_disagree(found: &mut [Finding]) {
     let disagree = |f: &&mut Finding| f.statistic == Statistic::Bias && f.replicated == Some(false);
-    for a in found.iter_mut().filter(disagree).flat_map(|f| &mut f.alternatives) {
-        a.probability = a.probability.map(|p| p * SURE_OF_DISAGREEING_HALVES);
-    }
+    found.iter_mut().filter(disagree).for_each(|f| less_sure(f, SURE_OF_DISAGREEING_HALVES));
+}
+
+/// Multiplies the probabilities of a finding's names by `share`.
+fn less_sure(f: &mut Finding, share: f64) {
+    f.alternatives.iter_mut().for_each(|a| a.probability = a.probability.map(|p| share * p));
 }
 
 /// Removes the name of a finding.
@@ -89,7 +91,7 @@ pub fn unname(f: &mut Finding) {
 pub fn finish(f: &mut Finding) {
     temper(&mut f.alternatives);
     let real = 1.0 - f.p_adjusted.map_or(0.0, by_chance);
-    f.alternatives.iter_mut().for_each(|a| a.probability = a.probability.map(|p| real * p));
+    less_sure(f, real);
     resembles_only(f);
     tell_if_held(f);
 }

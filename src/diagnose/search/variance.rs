@@ -247,3 +247,32 @@ fn onsets([start, end]: [f64; 2]) -> impl Iterator<Item = Candidate> {
     let onset = move |k| Candidate::step(Coordinate::Session, start + wide * k as f64, 0.5 * wide);
     (1..PLACES).filter(move |_| wide > 0.0).map(onset)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    /// Eq. 1 across the plane with z^3 added along the axis, which frontally is the larger from 1.4 m on: the refit follows the
+    /// log variance within 2 %, up to 66 degrees.
+    #[test]
+    fn the_refit_follows_noise_of_both_directions() {
+        let mut reach = Extent::of(std::iter::empty());
+        (reach.z, reach.theta) = ([0.8, 3.8], [0.0, 66f64.to_radians()]);
+        let Basis::Table { z_m, theta_rad, columns } = refit(&reach).basis else {
+            panic!("a table")
+        };
+        let log_variance = |n| {
+            let (z, theta) = table_place(z_m, theta_rad, n);
+            let across = 0.00151 + 0.00215 * (z - 0.483f64).powi(2);
+            let along = 0.0012 * z.powi(3);
+            ((across / theta.cos()).powi(2) + along * along).ln()
+        };
+        let target = DVector::from_fn(TABLE * TABLE, |n, _| log_variance(n));
+        let table = DMatrix::from_fn(TABLE * TABLE, columns.len(), |n, j| columns[j][n]);
+        let fit = table.clone().svd(true, true).solve(&target, 1e-12).expect("both sides");
+        let off = (table * fit - target).amax();
+        assert!(off < 0.02, "{off}");
+    }
+}
